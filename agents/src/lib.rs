@@ -1,0 +1,4 @@
+//! The agents that perceive, map and move: pure cores, and thin processes around them.
+#![forbid(unsafe_code)]
+
+pub mod messages;

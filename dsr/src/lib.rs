@@ -1,0 +1,3 @@
+//! The shared graph.
+mod time;
+pub use time::Time;

@@ -1,0 +1,4 @@
+//! The `cortex` program: see `cortex --help`.
+fn main() -> std::process::ExitCode {
+    cortex::main()
+}

@@ -1,0 +1,2 @@
+//! Multi-process and end-to-end tests of Cortex.
+#![forbid(unsafe_code)]

@@ -1,0 +1,4 @@
+//! The `cortex` program as the tests run it.
+fn main() -> std::process::ExitCode {
+    cortex::main()
+}
