@@ -8,7 +8,9 @@ use std::ops::{Add, Sub};
 /// A point in time: nanoseconds since 1970-01-01T00:00:00 UTC.
 ///
 /// Under simulation it is the simulated time, which starts at the scenario's `start`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize,
+)]
 pub struct Time(i64);
 
 impl Time {

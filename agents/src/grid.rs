@@ -1,0 +1,88 @@
+//! The cost grid that social mapping makes and navigation plans on. This file owns its geometry:
+//! which cell a point lies in and where a cell's centre is, the same for writer and reader.
+
+use nalgebra::Point2;
+
+/// A rectangular grid of traversal costs in the world frame (READING.md item 7).
+///
+/// Cell (column, row) covers `origin + resolution * [column, column+1) x [row, row+1)`; cells are
+/// stored row by row from the lowest y. A cost is at least 1; infinity blocks the cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CostGrid {
+    /// The lower left corner of cell (0, 0), world frame, metres.
+    pub origin: Point2<f64>,
+    /// Side of a cell, metres.
+    pub resolution: f64,
+    /// Number of columns (along x).
+    pub width: usize,
+    /// Number of rows (along y).
+    pub height: usize,
+    /// `width * height` costs.
+    pub costs: Vec<f32>,
+}
+
+/// The cost of a cell that nothing may enter.
+pub const BLOCKED: f32 = f32::INFINITY;
+/// The cost of a free cell.
+pub const FREE: f32 = 1.0;
+
+/// Column and row of a cell.
+pub type Cell = (usize, usize);
+
+impl CostGrid {
+    /// A grid of free cells that covers `bounds` (xmin, ymin, xmax, ymax; metres).
+    pub fn covering(bounds: [f64; 4], resolution: f64) -> Self {
+        let width = ((bounds[2] - bounds[0]) / resolution).ceil().max(1.0) as usize;
+        let height = ((bounds[3] - bounds[1]) / resolution).ceil().max(1.0) as usize;
+        Self {
+            origin: Point2::new(bounds[0], bounds[1]),
+            resolution,
+            width,
+            height,
+            costs: vec![FREE; width * height],
+        }
+    }
+
+    /// The cell that `point` (world frame) lies in, if the grid covers it.
+    pub fn cell_at(&self, point: Point2<f64>) -> Option<Cell> {
+        let column = ((point.x - self.origin.x) / self.resolution).floor();
+        let row = ((point.y - self.origin.y) / self.resolution).floor();
+        let inside =
+            column >= 0.0 && row >= 0.0 && column < self.width as f64 && row < self.height as f64;
+        inside.then_some((column as usize, row as usize))
+    }
+
+    /// The centre of `cell`, world frame.
+    pub fn centre(&self, cell: Cell) -> Point2<f64> {
+        Point2::new(
+            self.origin.x + (cell.0 as f64 + 0.5) * self.resolution,
+            self.origin.y + (cell.1 as f64 + 0.5) * self.resolution,
+        )
+    }
+
+    /// Where `cell` stands in `costs`.
+    pub fn index(&self, cell: Cell) -> usize {
+        cell.1 * self.width + cell.0
+    }
+
+    /// The cost of `cell`.
+    pub fn cost(&self, cell: Cell) -> f32 {
+        self.costs[self.index(cell)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_centre_of_a_cell_lies_in_it_and_outside_is_nowhere() {
+        let grid = CostGrid::covering([-1.0, 2.0, 3.02, 4.0], 0.05);
+        assert_eq!((grid.width, grid.height), (81, 40));
+        for cell in [(0, 0), (80, 39), (17, 5)] {
+            assert_eq!(grid.cell_at(grid.centre(cell)), Some(cell));
+        }
+        assert_eq!(grid.cell_at(Point2::new(-1.01, 3.0)), None);
+        assert_eq!(grid.cell_at(Point2::new(0.0, 4.01)), None);
+    }
+}
