@@ -1,0 +1,13 @@
+//! What the agents that perceive share: angles, who a camera can see, which room a point lies in,
+//! and optimal assignment. Everything here is a pure function of its arguments, so two runs on the
+//! same detections agree to the bit.
+
+mod angle;
+mod assignment;
+mod floor_plan;
+mod view;
+
+pub use angle::{HeadingEstimate, circular_mean, difference, wrap};
+pub use assignment::{Pair, assign};
+pub use floor_plan::FloorPlan;
+pub use view::{in_time_order, is_finite_pose, sees};
