@@ -2,5 +2,6 @@
 #![forbid(unsafe_code)]
 
 pub mod grid;
+pub mod human_observer;
 pub mod messages;
 pub mod perception;

@@ -24,7 +24,10 @@ pub(crate) fn polygon(outline: &[Point2<f64>]) -> Option<Polygon<f64>> {
     let usable = outline.len() >= 3 && outline.iter().all(|p| p.x.is_finite() && p.y.is_finite());
     usable.then(|| {
         Polygon::new(
-            LineString::from_iter(outline.iter().map(|&p| coordinate(p))),
+            outline
+                .iter()
+                .map(|&p| coordinate(p))
+                .collect::<LineString>(),
             Vec::new(),
         )
     })
