@@ -19,7 +19,7 @@ pub use config::{Config, Thresholds, Tracking};
 pub use scene::{Object, Scene, Shape, Surroundings, TrackedPerson};
 
 use crate::messages::CameraFrame;
-use crate::perception::{FloorPlan, Pair, assign, in_time_order, is_finite_pose, sees};
+use crate::perception::{FloorPlan, Pair, assign, hides, in_time_order, is_finite_pose, sees};
 use dsr::Time;
 use nalgebra::Point2;
 use relations::Relations;
@@ -264,16 +264,4 @@ impl Observer {
             }
         }
     }
-}
-
-/// Whether a body at `front` hides `place` from `camera`.
-fn hides(camera: Point2<f64>, front: Point2<f64>, place: Point2<f64>, radius: f64) -> bool {
-    let sight = place - camera;
-    let length = sight.norm();
-    if length <= radius {
-        return false;
-    }
-    let along = (front - camera).dot(&sight) / length;
-    let aside = (front - camera).perp(&sight).abs() / length;
-    aside < radius && along > 0.0 && along < length - radius
 }

@@ -4,4 +4,5 @@
 pub mod grid;
 pub mod human_observer;
 pub mod messages;
+pub mod object_recognition;
 pub mod perception;

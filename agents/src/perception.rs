@@ -11,7 +11,7 @@ pub use angle::{HeadingEstimate, circular_mean, difference, wrap};
 pub use assignment::{Pair, assign};
 pub use floor_plan::FloorPlan;
 pub(crate) use floor_plan::{distance_to_polygon, polygon};
-pub use view::{in_time_order, is_finite_pose, sees};
+pub use view::{hides, in_time_order, is_finite_pose, sees};
 
 #[cfg(test)]
 pub(crate) mod synthetic;

@@ -3,7 +3,7 @@
 use super::{FloorPlan, difference, sees};
 use crate::messages::{CameraFrame, ObjectDetection, PersonDetection};
 use dsr::Time;
-use nalgebra::{Isometry2, Point2, Vector2};
+use nalgebra::{Isometry2, Point2, UnitComplex, Vector2};
 use std::f64::consts::TAU;
 
 /// A small linear congruential generator (Knuth's MMIX constants), the high bits used.
@@ -122,6 +122,19 @@ pub(crate) struct Thing {
     pub(crate) size: Vector2<f64>,
 }
 
+impl Thing {
+    /// The detection of it without any error.
+    pub(crate) fn detection(&self, frame: &CameraFrame) -> ObjectDetection {
+        ObjectDetection {
+            class: self.class.to_owned(),
+            identity: self.identity.map(str::to_owned),
+            camera_from_object: frame.world_from_camera.inverse() * self.pose,
+            size: self.size,
+            score: 0.9,
+        }
+    }
+}
+
 /// Adds what `frame`'s camera shows of `things`; false detections have one of their classes.
 pub(crate) fn look_at_things(
     frame: &mut CameraFrame,
@@ -131,21 +144,16 @@ pub(crate) fn look_at_things(
     errors: Errors,
     random: &mut Random,
 ) {
-    let world_from_camera = frame.world_from_camera;
     for thing in things {
         let place = Point2::from(thing.pose.translation.vector);
         if sees(frame, plan, place, 0.0) && random.uniform() >= errors.miss {
-            let mut local = world_from_camera.inverse() * thing.pose;
-            local.translation.vector +=
-                Vector2::new(random.normal(), random.normal()) * errors.position;
-            let turn = nalgebra::UnitComplex::new(random.normal() * errors.heading);
-            frame.objects.push(ObjectDetection {
-                class: thing.class.to_owned(),
-                identity: thing.identity.map(str::to_owned),
-                camera_from_object: Isometry2::from_parts(local.translation, turn * local.rotation),
-                size: thing.size,
-                score: 0.9,
-            });
+            let mut detection = thing.detection(frame);
+            let noise = Vector2::new(random.normal(), random.normal()) * errors.position;
+            let turn = UnitComplex::new(random.normal() * errors.heading);
+            let local = &mut detection.camera_from_object;
+            local.translation.vector += noise;
+            local.rotation = turn * local.rotation;
+            frame.objects.push(detection);
         }
     }
     if !things.is_empty() && random.uniform() < errors.clutter * period {

@@ -35,6 +35,19 @@ pub fn sees(frame: &CameraFrame, plan: &FloorPlan, point: Point2<f64>, margin: f
     !plan.wall_between(camera, frame.world_from_camera * Point2::from(end))
 }
 
+/// Whether a body at `front` hides `place` from `camera`: it stands before it, within `radius` metres
+/// of the line of sight.
+pub fn hides(camera: Point2<f64>, front: Point2<f64>, place: Point2<f64>, radius: f64) -> bool {
+    let sight = place - camera;
+    let length = sight.norm();
+    if length <= radius {
+        return false;
+    }
+    let along = (front - camera).dot(&sight) / length;
+    let aside = (front - camera).perp(&sight).abs() / length;
+    aside < radius && along > 0.0 && along < length - radius
+}
+
 /// `frames` by time, then by the camera's name: the order in which evidence is taken in, whatever
 /// the order it arrived in.
 pub fn in_time_order(frames: &[CameraFrame]) -> Vec<&CameraFrame> {
@@ -94,6 +107,14 @@ mod tests {
             Point2::new(1.0, -0.1),
             0.3
         ));
+    }
+
+    #[test]
+    fn a_body_hides_what_is_right_behind_it() {
+        let (camera, place) = (Point2::new(0.0, 0.0), Point2::new(4.0, 0.0));
+        let hides = |x, y| hides(camera, Point2::new(x, y), place, 0.25);
+        assert!(hides(2.0, 0.2) && !hides(2.0, 0.3));
+        assert!(!hides(4.2, 0.0) && !hides(3.9, 0.0) && !hides(-1.0, 0.0));
     }
 
     #[test]
