@@ -7,6 +7,7 @@
 //! call give the same scene to the bit.
 
 mod config;
+mod graph;
 mod identity;
 mod relations;
 mod scene;
@@ -16,6 +17,7 @@ mod track;
 mod tests;
 
 pub use config::{Config, Thresholds, Tracking};
+pub use graph::{HumanObserver, people, person_id, person_name, surroundings};
 pub use scene::{Object, Scene, Shape, Surroundings, TrackedPerson};
 
 use crate::messages::CameraFrame;

@@ -7,12 +7,14 @@
 
 mod candidate;
 mod config;
+mod graph;
 mod place;
 
 #[cfg(test)]
 mod tests;
 
 pub use config::Config;
+pub use graph::{ObjectRecognition, objects};
 
 use crate::messages::{CameraFrame, ObjectDetection};
 use crate::perception::{FloorPlan, Pair, assign, hides, in_time_order, is_finite_pose, sees};
@@ -61,6 +63,17 @@ struct Sighting<'a> {
     pose: Isometry2<f64>,
 }
 
+/// A name longer than this, or empty, cannot be a node's.
+const GREATEST_NAME: usize = 255;
+
+impl Sighting<'_> {
+    /// The identity, if it can be a name.
+    fn identity(&self) -> Option<&str> {
+        let usable = |name: &&str| !name.is_empty() && name.len() <= GREATEST_NAME;
+        self.detection.identity.as_deref().filter(usable)
+    }
+}
+
 impl Recognizer {
     /// A recogniser that knows no objects.
     pub fn new(config: Config) -> Self {
@@ -76,15 +89,7 @@ impl Recognizer {
     /// Takes over an object known from before, as a restarted recogniser does. A name that is known
     /// already is left as it is.
     pub fn adopt(&mut self, object: &RecognizedObject) {
-        let number = object
-            .name
-            .strip_prefix(&object.class)
-            .and_then(|rest| rest.strip_prefix('_'))
-            .and_then(|digits| digits.parse::<u64>().ok());
-        if let Some(number) = number {
-            let next = self.next_number.entry(object.class.clone()).or_insert(1);
-            *next = (*next).max(number + 1);
-        }
+        self.reserve(&object.name);
         let known = self
             .objects
             .iter()
@@ -93,6 +98,18 @@ impl Recognizer {
             return;
         }
         self.objects.push(Candidate::resumed(object, &self.config));
+    }
+
+    /// Keeps `name`, where it is a class and a number, from being given to a new object of the class.
+    pub fn reserve(&mut self, name: &str) {
+        let Some((class, number)) = name.rsplit_once('_') else {
+            return;
+        };
+        let Ok(number) = number.parse::<u64>() else {
+            return;
+        };
+        let next = self.next_number.entry(class.to_owned()).or_insert(1);
+        *next = (*next).max(number.saturating_add(1));
     }
 
     /// Takes in `frames` and says what is where at `now`, in order of name.
@@ -141,7 +158,7 @@ impl Recognizer {
         let sightings = sightings(frame, &self.config);
         let mut free = Vec::new();
         for sighting in sightings {
-            match &sighting.detection.identity {
+            match sighting.identity() {
                 Some(identity) => self.identified(frame.time, identity, &sighting),
                 None => free.push(sighting),
             }
@@ -334,6 +351,8 @@ fn sightings<'a>(frame: &'a CameraFrame, config: &Config) -> Vec<Sighting<'a>> {
                 && distance <= frame.range + 4.0 * config.position_noise
                 && detection.size.iter().all(|s| s.is_finite() && *s >= 0.0)
                 && detection.score >= config.least_score
+                && !detection.class.is_empty()
+                && detection.class.len() < GREATEST_NAME - 20
         })
         .map(|detection| Sighting {
             detection,

@@ -5,6 +5,7 @@
 mod angle;
 mod assignment;
 mod floor_plan;
+pub(crate) mod graph;
 mod view;
 
 pub use angle::{HeadingEstimate, circular_mean, difference, wrap};

@@ -1,6 +1,7 @@
 //! The observer against synthetic cameras that err as the bars say: 0.1 m of noise, 10 % misses,
 //! one false detection a second and camera.
 
+mod binding;
 mod relating;
 mod tracking;
 

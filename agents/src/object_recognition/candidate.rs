@@ -60,8 +60,8 @@ impl Candidate {
     /// One that `sighting` may show.
     pub(super) fn new(time: Time, sighting: &Sighting, frame: u64, config: &Config) -> Self {
         Self {
-            name: sighting.detection.identity.clone(),
-            identified: sighting.detection.identity.is_some(),
+            name: sighting.identity().map(str::to_owned),
+            identified: sighting.identity().is_some(),
             confirmed: false,
             class: sighting.detection.class.clone(),
             place: Place::new(time, sighting.pose, config),

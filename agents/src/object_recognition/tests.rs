@@ -1,6 +1,8 @@
 //! The recogniser against synthetic cameras: 0.1 m of noise, 10 % misses, one false detection of a
 //! known class a second and camera.
 
+mod binding;
+
 use super::*;
 use crate::messages::PersonDetection;
 use crate::perception::synthetic::{Random, Thing, USUAL, camera, look_at_things};

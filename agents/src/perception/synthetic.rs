@@ -2,7 +2,7 @@
 
 use super::{FloorPlan, difference, sees};
 use crate::messages::{CameraFrame, ObjectDetection, PersonDetection};
-use dsr::Time;
+use dsr::{EdgeRef, Graph, Schema, Snapshot, Time, Transaction, Value};
 use nalgebra::{Isometry2, Point2, UnitComplex, Vector2};
 use std::f64::consts::TAU;
 
@@ -168,4 +168,97 @@ pub(crate) fn look_at_things(
             score: 0.6,
         });
     }
+}
+
+/// The part of the vocabulary of a scenario's schema that perception reads and writes.
+const SCHEMA: &str = r#"
+[types]
+thing = []
+world = ["thing"]
+room = ["thing"]
+person = ["thing"]
+robot = ["thing"]
+object = ["thing"]
+table = ["object"]
+tv = ["object"]
+
+[labels]
+pose = { from = ["thing"], to = ["thing"] }
+in = { from = ["person", "robot", "object"], to = ["room"] }
+is_near = { from = ["robot"], to = ["person"] }
+interacting = { from = ["person"], to = ["person", "object"] }
+front = { from = ["person"], to = ["robot"] }
+
+[attributes]
+transform = { kind = "pose" }
+walls = { kind = "f64_list" }
+polygon = { kind = "f64_list" }
+velocity = { kind = "vector" }
+radius = { kind = "f64" }
+confidence = { kind = "f64", min = 0.0, max = 1.0 }
+last_seen = { kind = "f64" }
+position_covariance = { kind = "vector" }
+shape = { kind = "string" }
+size = { kind = "vector" }
+space = { kind = "f64_list" }
+"#;
+
+/// A world of two rooms, `west` (x from -6 to 0) and `east` (to 6), 10 m deep, with a robot at
+/// (0, -3) that faces east.
+pub(crate) fn home() -> Graph {
+    let mut graph = Graph::in_memory(Schema::from_toml("schema.toml", SCHEMA).unwrap());
+    let mut world = Transaction::new();
+    let walls = Value::F64List(vec![-6.0, -5.0, 6.0, -5.0, -6.0, 5.0, 6.0, 5.0]);
+    world.create_node("world", "world", vec![("walls".to_owned(), walls)]);
+    for (name, x) in [("west", -6.0), ("east", 0.0)] {
+        let outline = vec![x, -5.0, x + 6.0, -5.0, x + 6.0, 5.0, x, 5.0];
+        world.create_node(
+            "room",
+            name,
+            vec![("polygon".to_owned(), Value::F64List(outline))],
+        );
+    }
+    world.create_node("robot", "shelly", Vec::new());
+    place(
+        &mut world,
+        "world",
+        "shelly",
+        Isometry2::new(Vector2::new(0.0, -3.0), 0.0),
+    );
+    graph.commit(&world, "loader", Time::default()).unwrap();
+    graph
+}
+
+/// Adds the `pose` edge by which `node` hangs from `parent`.
+pub(crate) fn place(
+    transaction: &mut Transaction,
+    parent: &str,
+    node: &str,
+    parent_from_node: Isometry2<f64>,
+) {
+    transaction.create_edge(parent, "pose", node);
+    transaction.set_on_edge(
+        EdgeRef::new(parent, "pose", node),
+        "transform",
+        parent_from_node,
+    );
+}
+
+/// The names at the ends of the edges of `label`, in order.
+pub(crate) fn edges(snapshot: &Snapshot, label: &str) -> Vec<(String, String)> {
+    let name = |id| snapshot.find_node(id).unwrap().unwrap().name().unwrap();
+    let label = snapshot.schema().label_id(label).unwrap();
+    let keys = snapshot.edges_of_label(label).map(Result::unwrap);
+    let mut edges: Vec<_> = keys.map(|key| (name(key.from), name(key.to))).collect();
+    edges.sort_unstable();
+    edges
+}
+
+/// The names of the nodes of a type, in order.
+pub(crate) fn names(snapshot: &Snapshot, type_name: &str) -> Vec<String> {
+    let type_id = snapshot.schema().type_id(type_name).unwrap();
+    let nodes = snapshot.nodes_of_type(type_id);
+    let mut names: Vec<_> = nodes.map(|node| node.unwrap().name().unwrap()).collect();
+    names.sort_unstable();
+    names
 }
