@@ -197,6 +197,7 @@ impl CostGrid {
 
 #[cfg(test)]
 mod tests {
+    use super::GridDecodeError as E;
     use super::*;
     use proptest::prelude::*;
 
@@ -208,7 +209,6 @@ mod tests {
             bytes[at..at + new.len()].copy_from_slice(new);
             CostGrid::from_bytes(&bytes).unwrap_err()
         };
-        use GridDecodeError as E;
         assert_eq!(
             CostGrid::from_bytes(&good[..47]),
             Err(E::Short { found: 47 })

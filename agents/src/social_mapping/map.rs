@@ -1,147 +1,23 @@
 //! From a scene to the grid, the polylines and what was rejected. This file owns the updating: it
 //! keeps the walls drawn, finds which stamps changed, and draws again only where they were and are.
 
+use super::config::{ConfigError, SocialConfig};
 use super::gaussian::AsymmetricGaussian;
 use super::layers::{Inflation, Stamp, Window};
-use super::object_space::{Space, UsageCurve};
 use super::scene::{Object, Person, Rejection, SceneError, SocialScene, Wall};
 use super::visibility::visible;
-use super::zones::{Cuts, Proxemics, Zone};
+use super::zones::{Cuts, Zone};
 use crate::grid::CostGrid;
 use dsr::Time;
 use nalgebra::{Isometry2, Point2};
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// The grid carries R(t) in steps of this size, so that an approaching activity changes it every
-/// few seconds and not at every turn.
-const USAGE_STEP: f64 = 0.01;
+/// Grid and graph carry R(t) to this many steps a unit, so that an approaching activity changes them
+/// every few seconds and not at every turn.
+const USAGE_STEPS: f64 = 100.0;
 /// With more changed windows than this, drawing everything is cheaper than comparing them.
 const MOST_WINDOWS: usize = 256;
-
-/// All figures of the social map; every one has the papers' or our documented default.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SocialConfig {
-    /// Side of a cell, metres.
-    pub resolution: f64,
-    /// People's density and zones. Preset `hall` with levels .9/.5/.1.
-    pub proxemics: Proxemics,
-    /// Whether the space of walking people reaches further ahead on the grid, by
-    /// [`AsymmetricGaussian::walking`]. Polylines and metrics keep the standing shape.
-    pub stretch: bool,
-    /// What a place right beside an obstacle costs more than a free one. The default stays below
-    /// the cheapest space of an object, so the order of READING.md item 7 holds; 0 turns it off.
-    pub clearance_cost: f64,
-    /// Over which distance from the blocked cells that falls to nothing, metres.
-    pub clearance_width: f64,
-    /// Half the width of the space between two who interact, metres. It costs as much as personal
-    /// space: a robot passes between two who talk only where there is no other way.
-    pub between_half_width: f64,
-    /// Two who interact from further than this leave no space between them, metres (the outer end
-    /// of Hall's social distance).
-    pub between_reach: f64,
-    /// The space of each class of objects; a class not named has none.
-    pub spaces: BTreeMap<String, Space>,
-    /// R(t).
-    pub usage: UsageCurve,
-    /// R(t) of single objects, by name.
-    pub usage_of: BTreeMap<String, UsageCurve>,
-    /// Points of a person's polylines.
-    pub contour_points: usize,
-}
-
-impl Default for SocialConfig {
-    fn default() -> Self {
-        let viewed = ["tv", "board"].map(|class| (class.to_owned(), Space::VIEWED));
-        let around = ["table", "bed", "stretcher"].map(|c| (c.to_owned(), Space::USED_AROUND));
-        Self {
-            resolution: 0.1,
-            proxemics: Proxemics::default(),
-            stretch: true,
-            clearance_cost: 0.4,
-            clearance_width: 0.3,
-            between_half_width: 0.5,
-            between_reach: 3.6,
-            spaces: viewed.into_iter().chain(around).collect(),
-            usage: UsageCurve::default(),
-            usage_of: BTreeMap::new(),
-            contour_points: 24,
-        }
-    }
-}
-
-/// A configuration that makes no map.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("social mapping: {field} {requirement}")]
-pub struct ConfigError {
-    /// The field at fault.
-    pub field: String,
-    /// What it has to be.
-    pub requirement: &'static str,
-}
-
-impl SocialConfig {
-    /// Everything that is wrong with the figures.
-    pub fn problems(&self) -> Vec<ConfigError> {
-        let not_negative = |x: f64| x.is_finite() && x >= 0.0;
-        let length = "must be a finite length, not negative";
-        let curve = "needs 1 <= least <= most, a ramp longer than 0 s and steps larger than 0";
-        let mut checks = vec![
-            (
-                "resolution".to_owned(),
-                self.resolution.is_finite() && self.resolution > 0.0,
-                "must be a finite length greater than 0",
-            ),
-            (
-                "proxemics.shape".to_owned(),
-                self.proxemics.shape.is_valid(),
-                "needs three finite widths greater than 0",
-            ),
-            (
-                "proxemics.levels".to_owned(),
-                self.proxemics.levels.is_valid(),
-                "must satisfy 0 < social < personal < intimate < 1",
-            ),
-            (
-                "clearance_cost".to_owned(),
-                not_negative(self.clearance_cost),
-                "must be finite and not negative",
-            ),
-            (
-                "clearance_width".to_owned(),
-                not_negative(self.clearance_width),
-                length,
-            ),
-            (
-                "between_half_width".to_owned(),
-                not_negative(self.between_half_width),
-                length,
-            ),
-            (
-                "between_reach".to_owned(),
-                not_negative(self.between_reach),
-                length,
-            ),
-            ("usage".to_owned(), self.usage.is_valid(), curve),
-        ];
-        checks.extend(
-            self.usage_of
-                .iter()
-                .map(|(o, c)| (format!("usage_of.{o}"), c.is_valid(), curve)),
-        );
-        checks.extend(self.spaces.iter().map(|(class, space)| {
-            let requirement = "needs finite lengths greater than 0 and an opening below pi";
-            (format!("spaces.{class}"), space.is_valid(), requirement)
-        }));
-        checks
-            .into_iter()
-            .filter(|(_, sound, _)| !sound)
-            .map(|(field, _, requirement)| ConfigError { field, requirement })
-            .collect()
-    }
-}
 
 /// What one update brought.
 #[derive(Debug, Clone, PartialEq)]
@@ -185,6 +61,13 @@ pub struct ObjectUse {
     pub space: Vec<Point2<f64>>,
     /// R(t) now.
     pub usage: f64,
+}
+
+impl ObjectUse {
+    /// R(t) to the hundredth, as the grid and the graph carry it; exact at the curve's ends.
+    pub fn rounded_usage(&self) -> f64 {
+        (self.usage * USAGE_STEPS).round() / USAGE_STEPS
+    }
 }
 
 /// Makes the social map, and makes anew only what changed since the last update.
@@ -237,7 +120,7 @@ impl SocialMapper {
     /// [`SceneError`] where no map can be made; the map before stays for the next update.
     pub fn update(&mut self, now: Time, scene: &SocialScene) -> Result<Update, SceneError> {
         scene.check(self.config.resolution)?;
-        let mut rejected = Vec::new();
+        let mut rejected = scene.rejected.clone();
         let people = scene.sound_people(&mut rejected);
         let objects = scene.sound_objects(&mut rejected);
         scene.check_activities(
@@ -330,7 +213,7 @@ impl SocialMapper {
         });
         let spaces = uses.iter().map(|one| Stamp::Space {
             polygon: one.space.clone(),
-            cost: ((one.usage / USAGE_STEP).round() * USAGE_STEP) as f32,
+            cost: one.rounded_usage() as f32,
         });
         footprints.chain(spaces).collect()
     }

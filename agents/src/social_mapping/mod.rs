@@ -8,7 +8,9 @@
 //! The layers, in AP's order: walls and the footprints of objects, inflated by the robot's radius;
 //! the spaces of objects with R(t); people with their zones; the space between people who talk.
 
+pub mod config;
 pub mod gaussian;
+pub mod graph;
 mod layers;
 pub mod map;
 pub mod object_space;
@@ -16,8 +18,10 @@ pub mod scene;
 mod visibility;
 pub mod zones;
 
+pub use config::{ConfigError, SocialConfig};
 pub use gaussian::AsymmetricGaussian;
-pub use map::{ObjectUse, PersonSpaces, SocialConfig, SocialMapper, Update};
+pub use graph::{SocialMapping, Turn};
+pub use map::{ObjectUse, PersonSpaces, SocialMapper, Update};
 pub use object_space::{Agenda, Outline, Space, UsageCurve};
 pub use scene::{Rejection, SceneError, SocialScene};
 pub use zones::{Levels, Proxemics, Zone, zone_at};

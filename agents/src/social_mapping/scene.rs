@@ -31,6 +31,8 @@ pub struct SocialScene {
     pub objects: Vec<Object>,
     /// What is done with them when.
     pub activities: Vec<Activity>,
+    /// What whoever made the scene had to leave out; the update passes it on.
+    pub rejected: Vec<Rejection>,
 }
 
 /// A person.
@@ -162,6 +164,12 @@ pub enum Rejection {
         object: String,
         /// What is wrong.
         error: EndsBeforeStart,
+    },
+    /// The activity is left out.
+    #[error("activity {activity} is ignored: its start or end is not a time")]
+    ActivityTime {
+        /// The activity.
+        activity: String,
     },
     /// The activity has no effect.
     #[error("an activity uses {object}, which the map does not have or which has no space")]

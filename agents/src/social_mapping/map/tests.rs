@@ -1,7 +1,8 @@
 use super::*;
 use crate::grid::{BLOCKED, FREE};
-use crate::social_mapping::object_space::Outline;
+use crate::social_mapping::object_space::{Outline, UsageCurve};
 use crate::social_mapping::scene::Activity;
+use crate::social_mapping::zones::Proxemics;
 use nalgebra::Vector2;
 use proptest::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -66,7 +67,7 @@ fn cost(update: &Update, x: f64, y: f64) -> f32 {
 fn assert_cost(update: &Update, x: f64, y: f64, expected: f32) {
     let found = cost(update, x, y);
     assert!(
-        found == expected || (found - expected).abs() < 1e-6,
+        found.total_cmp(&expected).is_eq() || (found - expected).abs() < 1e-6,
         "{found} at ({x}, {y})"
     );
 }
@@ -339,19 +340,6 @@ fn a_scene_that_makes_no_map_is_refused_and_the_map_survives() {
 }
 
 #[test]
-fn figures_that_make_no_map_are_all_named() {
-    let mut config = SocialConfig {
-        resolution: 0.0,
-        ..SocialConfig::default()
-    };
-    config.proxemics.levels.personal = 0.95;
-    config.spaces.insert("bath".into(), Space::Margin(f64::NAN));
-    let problems: Vec<_> = config.problems().into_iter().map(|p| p.field).collect();
-    assert_eq!(problems, ["resolution", "proxemics.levels", "spaces.bath"]);
-    assert!(SocialMapper::new(config).is_err());
-}
-
-#[test]
 fn changed_means_that_a_cost_differs() {
     let mut scene = hall();
     scene.people.push(person("ana", pose(5.0, 5.0, 0.0)));
@@ -497,7 +485,7 @@ proptest! {
                 });
                 if !touches {
                     let zone = Proxemics::default().zone_at(centre, &poses);
-                    prop_assert_eq!(map.grid.cost(cell), zone.cost());
+                    prop_assert!(map.grid.cost(cell).total_cmp(&zone.cost()).is_eq());
                 }
             }
         }
