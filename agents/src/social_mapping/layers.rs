@@ -277,3 +277,35 @@ fn distance_to_outline(place: Point2<f64>, outline: &Outline) -> f64 {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::social_mapping::object_space::Space;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_space_covers_the_cells_whose_centres_it_contains(
+            x in -1.0..5.0f64, y in -1.0..5.0f64, heading in -4.0..4.0f64, viewed: bool,
+        ) {
+            let space = if viewed { Space::VIEWED } else { Space::USED_AROUND };
+            let outline = Outline::Rectangle(Vector2::new(1.3, 0.7));
+            let pose = Isometry2::new(Vector2::new(x, y), heading);
+            let polygon = space.polygon(&outline, &pose);
+            let mut grid = CostGrid::covering([0.0, 0.0, 4.0, 3.0], 0.1);
+            Stamp::Space { polygon: polygon.clone(), cost: 2.5 }.draw(&mut grid);
+            for index in 0..grid.costs.len() {
+                let centre = grid.centre((index % grid.width, index / grid.width));
+                let depth = polygon
+                    .iter()
+                    .zip(polygon.iter().cycle().skip(1))
+                    .map(|(a, b)| (b - a).normalize().perp(&(centre - a)))
+                    .fold(f64::INFINITY, f64::min);
+                if depth.abs() > 1e-9 {
+                    prop_assert_eq!(depth > 0.0, grid.costs[index] > 2.0, "at {}", centre);
+                }
+            }
+        }
+    }
+}

@@ -95,6 +95,8 @@ fn distance_along(from: Point2<f64>, direction: Vector2<f64>, segment: &Wall) ->
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::social_mapping::object_space::{Outline, Space};
+    use nalgebra::Isometry2;
 
     fn square() -> Vec<Point2<f64>> {
         [(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)]
@@ -155,5 +157,17 @@ mod tests {
         let walls = [wall((2.0, -1.0), (2.0, 5.0)), wall((-1.0, 2.0), (5.0, 2.0))];
         let seen = visible(&square(), Point2::new(0.5, 0.5), &walls);
         assert!((area(&seen) - 4.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_television_detected_a_little_behind_its_wall_still_faces_its_room() {
+        let outline = Outline::Rectangle(Vector2::new(0.1, 1.2));
+        let tv = Isometry2::new(Vector2::new(-0.08, 5.0), 0.0);
+        let space = Space::VIEWED.polygon(&outline, &tv);
+        let eye = Space::VIEWED.viewpoint(&outline, &tv);
+        let seen = visible(&space, eye, &[wall((0.0, -9.0), (0.0, 19.0))]);
+        assert!(seen.iter().all(|p| p.x > -1e-9));
+        // All but the strip of 0.08 m behind the wall, about 2 m wide.
+        assert!((area(&space) - area(&seen) - 0.08 * 2.06).abs() < 1e-2);
     }
 }
