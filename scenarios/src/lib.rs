@@ -1,2 +1,10 @@
-//! TODO-DOC
+//! Everything around a run that is not an agent: the scenario folder and its diagnostics, the
+//! world simulator that moves robot and people and makes sensor readings, recorded pedestrians.
+//!
+//! Nothing here reads a clock or starts a process: a scenario is data, and the world is a function
+//! of scenario, seed and inputs.
 #![forbid(unsafe_code)]
+
+pub mod scenario;
+
+pub use scenario::{LoadError, Scenario};
