@@ -6,5 +6,9 @@
 #![forbid(unsafe_code)]
 
 pub mod scenario;
+pub mod tracks;
+pub mod world;
 
 pub use scenario::{LoadError, Scenario};
+pub use tracks::{Tracks, TracksError};
+pub use world::{Inputs, Outputs, Truth, World};
