@@ -6,3 +6,4 @@ pub mod human_observer;
 pub mod messages;
 pub mod object_recognition;
 pub mod perception;
+pub mod social_mapping;
