@@ -5,6 +5,7 @@
 //! of scenario, seed and inputs.
 #![forbid(unsafe_code)]
 
+pub mod process;
 pub mod scenario;
 pub mod tracks;
 pub mod world;
