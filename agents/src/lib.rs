@@ -2,5 +2,8 @@
 #![forbid(unsafe_code)]
 
 pub mod grid;
+pub mod human_observer;
 pub mod messages;
+pub mod object_recognition;
+pub mod perception;
 pub mod social_mapping;
