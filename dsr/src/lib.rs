@@ -1,3 +1,32 @@
-//! The shared graph.
+//! The shared graph of Cortex: a directed, typed, labelled property graph in memory that one
+//! process writes and all read in place.
+//!
+//! [`Graph`] is its single writer, [`Snapshot`] its state as of one commit, [`Transaction`] what an
+//! agent asks for, [`Change`] what a commit did. Only the module `shm` knows of processes and
+//! shared memory; everything else is plain data and plain functions.
+
+#![deny(unsafe_code)]
+
+mod arena;
+mod change;
+mod graph;
+mod ids;
+mod schema;
+mod snapshot;
 mod time;
+mod transaction;
+mod value;
+
+pub use arena::ReadError;
+pub use change::{Change, EdgeChange, Filter, NodeChange, RuleApplication, Touch};
+pub use graph::{Graph, Limits, RuleEngine};
+pub use ids::{AttributeId, EdgeKey, Epoch, LabelId, NodeId, TypeId, Version, WriterId};
+pub use schema::{
+    AttributeType, Label, NameKind, NodeType, Schema, SchemaError, SchemaFileError, suggest,
+};
+pub use snapshot::{Attribute, Edge, Node, Snapshot};
 pub use time::Time;
+pub use transaction::{
+    Commit, EdgeRef, NodeRef, Operation, Owner, Precondition, Refusal, Transaction,
+};
+pub use value::{Pose, Value, ValueKind, planar_pose, pose_on_floor};

@@ -1,0 +1,365 @@
+//! The memory that a graph lives in: an array of atomic words in segments, written by one process
+//! and read in place by all. This file owns the header, the versions' roots and the rule by which
+//! a reader knows that what it read is whole; the formats of what lies behind a root are in the
+//! files beside it.
+//!
+//! Every structure behind a root is immutable once the root's version is published: a commit
+//! writes new blocks along the paths that it changes and shares the rest. A block that no version
+//! newer than `v` can reach is written over only after `oldest` was raised above `v`. So a reader
+//! reads, then looks at `oldest`: if its version is not older, all that it read was genuine.
+
+pub(crate) mod allocator;
+pub(crate) mod record;
+pub(crate) mod tree;
+pub(crate) mod trie;
+
+use crate::{Epoch, Time, Version};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, Ordering, fence};
+use thiserror::Error;
+
+/// A word of the arena.
+#[derive(Debug, Default)]
+#[repr(transparent)]
+pub struct Word(AtomicU64);
+
+impl Word {
+    pub(crate) fn load(&self) -> u64 {
+        self.0.load(Ordering::Relaxed)
+    }
+    pub(crate) fn store(&self, value: u64) {
+        self.0.store(value, Ordering::Relaxed);
+    }
+    pub(crate) fn load_acquire(&self) -> u64 {
+        self.0.load(Ordering::Acquire)
+    }
+    pub(crate) fn store_release(&self, value: u64) {
+        self.0.store(value, Ordering::Release);
+    }
+}
+
+/// Where a block lies: the index of its first word over all segments. 0 is nowhere.
+pub(crate) type Address = u64;
+
+/// Why a read of a snapshot gave nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum ReadError {
+    /// The store has reused memory of this version: its history is bounded. Take a new snapshot.
+    #[error("version {version} is too old: the oldest that can still be read is {oldest}")]
+    SnapshotTooOld {
+        /// The snapshot's version.
+        version: Version,
+        /// The oldest version that can still be read.
+        oldest: Version,
+    },
+    /// The arena holds something that no store writes.
+    #[error("the graph's memory is damaged at word {address}")]
+    Damaged {
+        /// Where.
+        address: u64,
+    },
+}
+
+/// Memory that a segment of the arena lies in.
+pub(crate) trait Segment: Send + Sync + std::fmt::Debug {
+    /// The segment's words.
+    fn words(&self) -> &[Word];
+}
+
+impl Segment for Box<[Word]> {
+    fn words(&self) -> &[Word] {
+        self
+    }
+}
+
+pub(crate) const MAGIC: u64 = u64::from_le_bytes(*b"cortexG1");
+pub(crate) const FORMAT: u64 = 1;
+
+/// Header words of segment 0.
+mod at {
+    pub(super) const MAGIC: usize = 0;
+    pub(super) const FORMAT: usize = 1;
+    pub(super) const EPOCH: usize = 2;
+    pub(super) const HEAD: usize = 3;
+    pub(super) const OLDEST: usize = 4;
+    pub(super) const SEGMENTS: usize = 5;
+    pub(super) const ROOTS: usize = 64;
+}
+
+/// How many versions back a root can be looked up.
+const ROOT_RING: u64 = 256;
+/// Words of a root.
+pub(crate) const ROOT_WORDS: usize = 16;
+/// First word that blocks are given out from.
+pub(crate) const FIRST_BLOCK: Address = at::ROOTS as u64 + ROOT_RING * ROOT_WORDS as u64;
+
+/// One version of the graph: where its structures begin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Root {
+    pub(crate) version: u64,
+    pub(crate) time: i64,
+    /// Trie from node id to node record.
+    pub(crate) nodes: Address,
+    /// Tree from (hash of name, node id) to node record.
+    pub(crate) names: Address,
+    /// Directory by type: tree of node ids, count.
+    pub(crate) types: Address,
+    /// Directory by label: tree of (from, to), count.
+    pub(crate) labels: Address,
+    /// Blob: the schema, and how often it changed.
+    pub(crate) schema: Address,
+    pub(crate) schema_version: u64,
+    /// Blob: the names of the agents that have written.
+    pub(crate) writers: Address,
+    pub(crate) node_count: u64,
+    pub(crate) edge_count: u64,
+    pub(crate) next_id: u64,
+}
+
+impl Root {
+    fn to_words(self) -> [u64; ROOT_WORDS] {
+        let Self {
+            version,
+            time,
+            nodes,
+            names,
+            types,
+            labels,
+            schema,
+            schema_version,
+            ..
+        } = self;
+        let Self {
+            writers,
+            node_count,
+            edge_count,
+            next_id,
+            ..
+        } = self;
+        let time = time.cast_unsigned();
+        let mut words = [0; ROOT_WORDS];
+        words[..12].copy_from_slice(&[
+            version,
+            time,
+            nodes,
+            names,
+            types,
+            labels,
+            schema,
+            schema_version,
+            writers,
+            node_count,
+            edge_count,
+            next_id,
+        ]);
+        words
+    }
+
+    fn from_words(words: &[u64; ROOT_WORDS]) -> Self {
+        let &[
+            version,
+            time,
+            nodes,
+            names,
+            types,
+            labels,
+            schema,
+            schema_version,
+            writers,
+            ..,
+        ] = words;
+        let [node_count, edge_count, next_id] = [words[9], words[10], words[11]];
+        let time = time.cast_signed();
+        Self {
+            version,
+            time,
+            nodes,
+            names,
+            types,
+            labels,
+            schema,
+            schema_version,
+            writers,
+            node_count,
+            edge_count,
+            next_id,
+        }
+    }
+
+    pub(crate) fn time(&self) -> Time {
+        Time::from_nanoseconds(self.time)
+    }
+}
+
+/// The arena as one process sees it.
+#[derive(Debug)]
+pub(crate) struct Arena {
+    segments: Box<[OnceLock<Box<dyn Segment>>]>,
+    /// log2 of the words in a segment.
+    shift: u32,
+}
+
+impl Arena {
+    /// An arena of up to `capacity` segments of `2^shift` words, none of them there yet.
+    pub(crate) fn new(capacity: usize, shift: u32) -> Self {
+        Self {
+            segments: (0..capacity).map(|_| OnceLock::new()).collect(),
+            shift,
+        }
+    }
+
+    pub(crate) fn segment_words(&self) -> usize {
+        1 << self.shift
+    }
+
+    pub(crate) fn capacity(&self) -> usize {
+        self.segments.len()
+    }
+
+    /// Segments that are there.
+    pub(crate) fn attached(&self) -> usize {
+        self.segments
+            .iter()
+            .take_while(|s| s.get().is_some())
+            .count()
+    }
+
+    /// Adds segment `index`; one that is there already stays.
+    pub(crate) fn attach(&self, index: usize, segment: Box<dyn Segment>) {
+        if let Some(slot) = self.segments.get(index)
+            && segment.words().len() >= self.segment_words()
+        {
+            slot.get_or_init(|| segment);
+        }
+    }
+
+    /// The words from `address` to the end of its segment.
+    pub(crate) fn from(&self, address: Address) -> Option<&[Word]> {
+        let segment = self.segments.get((address >> self.shift) as usize)?.get()?;
+        segment
+            .words()
+            .get((address as usize) & (self.segment_words() - 1)..)
+    }
+
+    /// The `len` words at `address`.
+    pub(crate) fn block(&self, address: Address, len: usize) -> Option<&[Word]> {
+        self.from(address)?.get(..len)
+    }
+
+    fn header(&self, index: usize) -> Option<&Word> {
+        self.from(0)?.get(index)
+    }
+
+    /// Writes the header of an empty arena; the writer's first act.
+    pub(crate) fn format(&self, epoch: Epoch) {
+        let put = |index, value| {
+            if let Some(word) = self.header(index) {
+                word.store(value);
+            }
+        };
+        put(at::FORMAT, FORMAT);
+        put(at::EPOCH, epoch.0);
+        put(at::SEGMENTS, 1);
+        // Version 0, the empty graph, is the root of zeros that the ring holds already.
+        if let Some(word) = self.header(at::MAGIC) {
+            word.store_release(MAGIC);
+        }
+    }
+
+    /// Whether segment 0 is an arena of this format, with its epoch.
+    pub(crate) fn epoch(&self) -> Option<Epoch> {
+        let right = self.header(at::MAGIC)?.load_acquire() == MAGIC
+            && self.header(at::FORMAT)?.load() == FORMAT;
+        right.then_some(Epoch(self.header(at::EPOCH)?.load()))
+    }
+
+    /// How many segments the writer has added.
+    pub(crate) fn announced_segments(&self) -> u64 {
+        self.header(at::SEGMENTS).map_or(0, Word::load_acquire)
+    }
+
+    pub(crate) fn announce_segments(&self, count: u64) {
+        if let Some(word) = self.header(at::SEGMENTS) {
+            word.store_release(count);
+        }
+    }
+
+    /// The newest version.
+    pub(crate) fn head(&self) -> u64 {
+        self.header(at::HEAD).map_or(0, Word::load_acquire)
+    }
+
+    /// The oldest version that can still be read.
+    pub(crate) fn oldest(&self) -> u64 {
+        self.header(at::OLDEST).map_or(0, Word::load)
+    }
+
+    fn root_at(&self, version: u64) -> Option<&[Word]> {
+        let slot = at::ROOTS + (version % ROOT_RING) as usize * ROOT_WORDS;
+        self.from(0)?.get(slot..slot + ROOT_WORDS)
+    }
+
+    /// Reads the newest version's root.
+    pub(crate) fn newest_root(&self) -> Result<Root, ReadError> {
+        loop {
+            let version = self.head();
+            let slot = self
+                .root_at(version)
+                .ok_or(ReadError::Damaged { address: 0 })?;
+            let mut words = [0; ROOT_WORDS];
+            for (to, from) in words.iter_mut().zip(slot) {
+                *to = from.load();
+            }
+            fence(Ordering::Acquire);
+            // The slot is written over no sooner than when `head` is within one of a ring's turn.
+            if self.head().wrapping_sub(version) < ROOT_RING - 1 {
+                let root = Root::from_words(&words);
+                if root.version != version {
+                    return Err(ReadError::Damaged {
+                        address: at::ROOTS as u64,
+                    });
+                }
+                return Ok(root);
+            }
+        }
+    }
+
+    /// Makes `root` the newest version: one release store, before which nobody sees any of it.
+    pub(crate) fn publish(&self, root: &Root) {
+        if let (Some(slot), Some(head)) = (self.root_at(root.version), self.header(at::HEAD)) {
+            for (to, from) in slot.iter().zip(root.to_words()) {
+                to.store(from);
+            }
+            head.store_release(root.version);
+        }
+    }
+
+    /// Declares versions before `oldest` unreadable, before their memory is written over.
+    pub(crate) fn forget_before(&self, oldest: u64) {
+        if let Some(word) = self.header(at::OLDEST) {
+            word.store(oldest);
+        }
+        fence(Ordering::Release);
+    }
+
+    /// Whether all that was read of `version` up to now was genuine.
+    pub(crate) fn check(&self, version: u64) -> Result<(), ReadError> {
+        fence(Ordering::Acquire);
+        let oldest = self.oldest();
+        if version < oldest {
+            return Err(ReadError::SnapshotTooOld {
+                version: Version(version),
+                oldest: Version(oldest),
+            });
+        }
+        Ok(())
+    }
+
+    /// The error of a read that met something impossible at `address`: either the memory was
+    /// reused under the reader, or it is damaged.
+    pub(crate) fn broken(&self, version: u64, address: Address) -> ReadError {
+        self.check(version)
+            .err()
+            .unwrap_or(ReadError::Damaged { address })
+    }
+}

@@ -1,0 +1,340 @@
+//! Ordered maps from a key of two words to one word: a B+ tree of immutable blocks. Adjacency,
+//! names, and the members of types and labels are such maps, so that what is read together lies
+//! together: a scan costs a few loads per entry.
+//!
+//! Block: `count << 1`, plus 1 in an inner block; then `count` entries of (key, key, word) in
+//! ascending order. In an inner block the word is a child's address and the key the least in it.
+//! An empty tree is address 0.
+
+use super::allocator::Full;
+use super::{Address, Arena, Word};
+use crate::graph::Writer;
+
+pub(crate) type Key = [u64; 2];
+pub(crate) type Entry = (Key, u64);
+
+const CAPACITY: usize = 32;
+/// No tree is deeper; a deeper one is damaged.
+const MAX_DEPTH: usize = 20;
+
+struct Block<'a> {
+    inner: bool,
+    words: &'a [Word],
+}
+
+impl<'a> Block<'a> {
+    fn at(arena: &'a Arena, address: Address) -> Result<Self, Address> {
+        let words = arena.from(address).ok_or(address)?;
+        let head = words.first().ok_or(address)?.load();
+        let count = (head >> 1) as usize;
+        if count == 0 || count > CAPACITY {
+            return Err(address);
+        }
+        let words = words.get(1..=3 * count).ok_or(address)?;
+        Ok(Self {
+            inner: head & 1 == 1,
+            words,
+        })
+    }
+
+    fn len(&self) -> usize {
+        self.words.len() / 3
+    }
+
+    fn key(&self, index: usize) -> Key {
+        [
+            self.words[3 * index].load(),
+            self.words[3 * index + 1].load(),
+        ]
+    }
+
+    fn word(&self, index: usize) -> u64 {
+        self.words[3 * index + 2].load()
+    }
+
+    /// How many keys are smaller than `key`.
+    fn lower_bound(&self, key: Key) -> usize {
+        let (mut low, mut high) = (0, self.len());
+        while low < high {
+            let middle = usize::midpoint(low, high);
+            if self.key(middle) < key {
+                low = middle + 1
+            } else {
+                high = middle
+            }
+        }
+        low
+    }
+
+    /// The child that `key` belongs to.
+    fn child_of(&self, key: Key) -> usize {
+        let after = self.lower_bound(key);
+        if after < self.len() && self.key(after) == key {
+            after
+        } else {
+            after.saturating_sub(1)
+        }
+    }
+}
+
+/// The word at `key`; `Err` where the tree leads to an impossible place.
+pub(crate) fn find(arena: &Arena, root: Address, key: Key) -> Result<Option<u64>, Address> {
+    if root == 0 {
+        return Ok(None);
+    }
+    let mut address = root;
+    for _ in 0..MAX_DEPTH {
+        let block = Block::at(arena, address)?;
+        if block.inner {
+            address = block.word(block.child_of(key));
+            continue;
+        }
+        let index = block.lower_bound(key);
+        let found = index < block.len() && block.key(index) == key;
+        return Ok(found.then(|| block.word(index)));
+    }
+    Err(address)
+}
+
+/// Walks the entries from `from` to `to` (both included) in ascending order.
+#[derive(Debug, Clone)]
+pub(crate) struct Range {
+    /// Inner blocks on the way down, with the next child to visit.
+    path: Vec<(Address, usize)>,
+    leaf: Address,
+    index: usize,
+    to: Key,
+    last: Option<Key>,
+}
+
+impl Range {
+    pub(crate) fn new(arena: &Arena, root: Address, from: Key, to: Key) -> Result<Self, Address> {
+        let mut range = Self {
+            path: Vec::new(),
+            leaf: 0,
+            index: 0,
+            to,
+            last: None,
+        };
+        if root != 0 && from <= to {
+            range.descend(arena, root, Some(from))?;
+        }
+        Ok(range)
+    }
+
+    fn descend(&mut self, arena: &Arena, root: Address, key: Option<Key>) -> Result<(), Address> {
+        let mut address = root;
+        while self.path.len() < MAX_DEPTH {
+            let block = Block::at(arena, address)?;
+            if block.inner {
+                let child = key.map_or(0, |key| block.child_of(key));
+                self.path.push((address, child + 1));
+                address = block.word(child);
+            } else {
+                self.leaf = address;
+                self.index = key.map_or(0, |key| block.lower_bound(key));
+                return Ok(());
+            }
+        }
+        Err(address)
+    }
+
+    /// The next entry; `Err` where the tree leads to an impossible place.
+    pub(crate) fn next(&mut self, arena: &Arena) -> Result<Option<Entry>, Address> {
+        while self.leaf != 0 {
+            let block = Block::at(arena, self.leaf)?;
+            if block.inner {
+                return Err(self.leaf);
+            }
+            if self.index < block.len() {
+                let key = block.key(self.index);
+                // Ascending keys also bound the walk in a damaged arena.
+                if self.last.is_some_and(|last| key <= last) {
+                    return Err(self.leaf);
+                }
+                if key > self.to {
+                    self.leaf = 0;
+                    return Ok(None);
+                }
+                self.last = Some(key);
+                self.index += 1;
+                return Ok(Some((key, block.word(self.index - 1))));
+            }
+            self.leaf = 0;
+            while let Some((address, child)) = self.path.pop() {
+                let block = Block::at(arena, address)?;
+                if child < block.len() {
+                    self.path.push((address, child + 1));
+                    self.descend(arena, block.word(child), None)?;
+                    break;
+                }
+            }
+        }
+        Ok(None)
+    }
+}
+
+fn read(arena: &Arena, address: Address) -> (bool, Vec<Entry>) {
+    Block::at(arena, address).map_or((false, Vec::new()), |block| {
+        (
+            block.inner,
+            (0..block.len())
+                .map(|i| (block.key(i), block.word(i)))
+                .collect(),
+        )
+    })
+}
+
+fn encode(inner: bool, entries: &[Entry]) -> Vec<u64> {
+    let mut words = Vec::with_capacity(1 + 3 * entries.len());
+    words.push((entries.len() as u64) << 1 | u64::from(inner));
+    words.extend(entries.iter().flat_map(|&([a, b], word)| [a, b, word]));
+    words
+}
+
+fn words_of(entries: usize) -> usize {
+    1 + 3 * entries
+}
+
+/// Sets `key` to `word`; the new root.
+pub(crate) fn insert(
+    writer: &mut Writer,
+    root: Address,
+    key: Key,
+    word: u64,
+) -> Result<Address, Full> {
+    if root == 0 {
+        return writer.write(&encode(false, &[(key, word)]));
+    }
+    let (left, right) = insert_at(writer, root, key, word)?;
+    let Some((right_key, right)) = right else {
+        return Ok(left);
+    };
+    let (_, entries) = read(writer.arena(), left);
+    let left_key = entries.first().map_or(key, |entry| entry.0);
+    writer.write(&encode(true, &[(left_key, left), (right_key, right)]))
+}
+
+type Split = Option<(Key, Address)>;
+
+fn insert_at(
+    writer: &mut Writer,
+    address: Address,
+    key: Key,
+    word: u64,
+) -> Result<(Address, Split), Full> {
+    let (inner, mut entries) = read(writer.arena(), address);
+    let old = entries.len();
+    let after = entries.partition_point(|entry| entry.0 < key);
+    let exact = entries.get(after).is_some_and(|entry| entry.0 == key);
+    let mut at_end = after == old;
+    if inner {
+        let child = if exact {
+            after
+        } else {
+            after.saturating_sub(1)
+        };
+        at_end = child + 1 == old;
+        let (below, split) = insert_at(writer, entries[child].1, key, word)?;
+        if below == entries[child].1 && split.is_none() && entries[child].0 <= key {
+            return Ok((address, None));
+        }
+        entries[child] = (entries[child].0.min(key), below);
+        if let Some(split) = split {
+            entries.insert(child + 1, split);
+        }
+    } else if exact {
+        if entries[after].1 == word {
+            return Ok((address, None));
+        }
+        entries[after].1 = word;
+    } else {
+        entries.insert(after, (key, word));
+    }
+    if entries.len() <= CAPACITY {
+        let block = writer.replace(address, words_of(old), &encode(inner, &entries))?;
+        return Ok((block, None));
+    }
+    // Keys that come in ascending order leave full blocks behind, not half empty ones.
+    let keep = if at_end {
+        CAPACITY * 7 / 8
+    } else {
+        CAPACITY / 2
+    };
+    let right = writer.write(&encode(inner, &entries[keep..]))?;
+    let left = writer.replace(address, words_of(old), &encode(inner, &entries[..keep]))?;
+    Ok((left, Some((entries[keep].0, right))))
+}
+
+/// Takes `key` out; the new root, 0 where the tree is empty.
+pub(crate) fn remove(writer: &mut Writer, root: Address, key: Key) -> Result<Address, Full> {
+    if root == 0 {
+        return Ok(0);
+    }
+    let mut root = remove_at(writer, root, key)?;
+    // A root with one child is its child.
+    while root != 0 {
+        let (inner, entries) = read(writer.arena(), root);
+        if !inner || entries.len() != 1 {
+            break;
+        }
+        writer.retire(root, words_of(1));
+        root = entries[0].1;
+    }
+    Ok(root)
+}
+
+fn remove_at(writer: &mut Writer, address: Address, key: Key) -> Result<Address, Full> {
+    let (inner, mut entries) = read(writer.arena(), address);
+    let old = entries.len();
+    let after = entries.partition_point(|entry| entry.0 < key);
+    let exact = entries.get(after).is_some_and(|entry| entry.0 == key);
+    if inner {
+        let child = if exact {
+            after
+        } else {
+            after.saturating_sub(1)
+        };
+        let below = remove_at(writer, entries[child].1, key)?;
+        if below == entries[child].1 {
+            return Ok(address);
+        }
+        if below == 0 {
+            entries.remove(child);
+        } else {
+            entries[child].1 = below;
+            merge(writer, &mut entries, child)?;
+        }
+    } else if exact {
+        entries.remove(after);
+    } else {
+        return Ok(address);
+    }
+    if entries.is_empty() {
+        writer.retire(address, words_of(old));
+        return Ok(0);
+    }
+    writer.replace(address, words_of(old), &encode(inner, &entries))
+}
+
+/// Joins child `index` with a neighbour where both fit in half a block.
+fn merge(writer: &mut Writer, entries: &mut Vec<Entry>, index: usize) -> Result<(), Full> {
+    let left = index.saturating_sub(1);
+    for left in left..=index.min(entries.len().saturating_sub(2)) {
+        let Some(&[(_, a), (_, b)]) = entries.get(left..left + 2).and_then(|e| e.first_chunk())
+        else {
+            return Ok(());
+        };
+        let (inner, mut joined) = read(writer.arena(), a);
+        let (_, right) = read(writer.arena(), b);
+        if joined.len() + right.len() <= CAPACITY / 2 {
+            let old = joined.len();
+            writer.retire(b, words_of(right.len()));
+            joined.extend(right);
+            entries[left].1 = writer.replace(a, words_of(old), &encode(inner, &joined))?;
+            entries.remove(left + 1);
+            return Ok(());
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,322 @@
+//! The graph's single writer: takes transactions, applies each whole or not at all, and publishes
+//! a version per commit. It knows no process, clock or socket; the store process is a thin shell
+//! around it, and so is everything that works on a file.
+
+mod apply;
+
+use crate::arena::allocator::{Allocator, Full, Growth, HeapGrowth};
+use crate::arena::{Address, Arena, Root, Word, record};
+use crate::{
+    Change, Commit, Epoch, NodeId, Operation, Refusal, Schema, Snapshot, Time, Transaction, Version,
+};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::Arc;
+
+/// What the store asks of a grammar: the meaning of [`Operation::ApplyRule`].
+pub trait RuleEngine: Send + Sync + fmt::Debug {
+    /// The operations that the rule makes at `binding`, if its left-hand side holds there.
+    ///
+    /// # Errors
+    /// [`Refusal::RuleNotApplicable`] with what does not hold.
+    fn expand(
+        &self,
+        snapshot: &Snapshot,
+        rule: &str,
+        binding: &[(String, NodeId)],
+    ) -> Result<Vec<Operation>, Refusal>;
+}
+
+/// Knobs of the writer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// How many bytes of old versions stay readable.
+    pub history_bytes: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            history_bytes: 64 << 20,
+        }
+    }
+}
+
+/// Writes blocks into the arena.
+#[derive(Debug)]
+pub(crate) struct Writer {
+    arena: Arc<Arena>,
+    allocator: Allocator,
+}
+
+impl Writer {
+    pub(crate) fn arena(&self) -> &Arena {
+        &self.arena
+    }
+
+    /// Writes a new block.
+    pub(crate) fn write(&mut self, words: &[u64]) -> Result<Address, Full> {
+        let address = self.allocator.allocate(&self.arena, words.len())?;
+        self.fill(address, words);
+        Ok(address)
+    }
+
+    fn fill(&self, address: Address, words: &[u64]) {
+        let block = self.arena.block(address, words.len()).unwrap_or(&[]);
+        for (to, from) in block.iter().zip(words) {
+            to.store(*from);
+        }
+    }
+
+    /// Writes `words` in place of the block of `old` words at `address`: into it where nobody
+    /// else can see it yet and they fit, else into a new block.
+    pub(crate) fn replace(
+        &mut self,
+        address: Address,
+        old: usize,
+        words: &[u64],
+    ) -> Result<Address, Full> {
+        if self.allocator.is_fresh(address) && words.len() == old {
+            self.fill(address, words);
+            return Ok(address);
+        }
+        let new = self.write(words)?;
+        self.retire(address, old);
+        Ok(new)
+    }
+
+    pub(crate) fn retire(&mut self, address: Address, words: usize) {
+        if address != 0 {
+            self.allocator.retire(address, words);
+        }
+    }
+}
+
+/// The graph and its single writer.
+///
+/// ```
+/// use dsr::{Graph, Schema, Time, Transaction};
+///
+/// let mut graph = Graph::in_memory(Schema::open());
+/// let mut transaction = Transaction::new();
+/// transaction.create_node("room", "kitchen", vec![("area".into(), 12.5.into())]);
+/// transaction.create_node("robot", "shelly", vec![]);
+/// transaction.create_edge("shelly", "in", "kitchen");
+/// graph.commit(&transaction, "me", Time::default())?;
+///
+/// let snapshot = graph.snapshot();
+/// let kitchen = snapshot.find_node_by_name("kitchen")?.unwrap();
+/// assert_eq!(kitchen.value("area")?.unwrap().as_f64(), Some(12.5));
+/// assert_eq!(kitchen.in_edges().count(), 1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Graph {
+    writer: Writer,
+    root: Root,
+    schema: Arc<Schema>,
+    writers: Vec<String>,
+    epoch: Epoch,
+    limits: Limits,
+    rules: Option<Arc<dyn RuleEngine>>,
+    /// Leases: the oldest version that each holder reads.
+    leases: BTreeMap<u64, u64>,
+}
+
+impl Graph {
+    /// An empty graph on the heap of this process.
+    pub fn in_memory(schema: Schema) -> Self {
+        // 1 MiB segments, 64 GiB at the most.
+        let arena = Arc::new(Arena::new(1 << 16, 17));
+        // The heap does not refuse; where it is exhausted the process ends.
+        Self::on(arena, Box::new(HeapGrowth), schema, Epoch(1)).unwrap_or_else(|Full| {
+            unreachable!("the first segment of an arena on the heap is always there")
+        })
+    }
+
+    /// An empty graph on an arena whose segments `growth` adds.
+    pub(crate) fn on(
+        arena: Arc<Arena>,
+        mut growth: Box<dyn Growth>,
+        schema: Schema,
+        epoch: Epoch,
+    ) -> Result<Self, Full> {
+        growth.grow(&arena, 0)?;
+        growth.reserve(0, 0, crate::arena::FIRST_BLOCK as usize)?;
+        let allocator = Allocator::new(growth);
+        let mut graph = Self {
+            writer: Writer { arena, allocator },
+            root: Root {
+                next_id: 1,
+                ..Root::default()
+            },
+            schema: Arc::new(schema),
+            writers: Vec::new(),
+            epoch,
+            limits: Limits::default(),
+            rules: None,
+            leases: BTreeMap::new(),
+        };
+        let mut root = graph.root;
+        graph.write_schema(&mut root)?;
+        root.version = 1;
+        graph.publish(root);
+        graph.writer.arena.format(epoch);
+        Ok(graph)
+    }
+
+    /// Sets the limits.
+    pub fn set_limits(&mut self, limits: Limits) {
+        self.limits = limits;
+    }
+
+    /// Sets the grammar that [`Operation::ApplyRule`] goes by.
+    pub fn set_rules(&mut self, rules: Arc<dyn RuleEngine>) {
+        self.rules = Some(rules);
+    }
+
+    /// The newest version.
+    pub fn snapshot(&self) -> Snapshot {
+        self.snapshot_of(self.root)
+    }
+
+    fn snapshot_of(&self, root: Root) -> Snapshot {
+        Snapshot {
+            arena: Arc::clone(&self.writer.arena),
+            root,
+            schema: Arc::clone(&self.schema),
+        }
+    }
+
+    pub(crate) fn arena(&self) -> &Arc<Arena> {
+        &self.writer.arena
+    }
+
+    /// This life of the store.
+    pub fn epoch(&self) -> Epoch {
+        self.epoch
+    }
+
+    /// Bytes that the current and the still readable old versions take.
+    pub fn bytes_in_use(&self) -> u64 {
+        self.writer.allocator.bytes_in_use()
+    }
+
+    /// Applies a transaction whole, and tells what it changed.
+    ///
+    /// # Errors
+    /// A [`Refusal`]; the graph is then as it was.
+    pub fn commit(
+        &mut self,
+        transaction: &Transaction,
+        agent: &str,
+        time: Time,
+    ) -> Result<(Commit, Change), Refusal> {
+        let before = (Arc::clone(&self.schema), self.writers.len());
+        let outcome = match self.try_commit(transaction, agent, time) {
+            Err(Refusal::OutOfMemory { .. }) => {
+                // History gives way before a commit is refused.
+                self.abandon(&before);
+                self.reclaim(0);
+                self.try_commit(transaction, agent, time)
+            }
+            other => other,
+        };
+        match outcome {
+            Ok((root, created, change)) => {
+                self.publish(root);
+                self.reclaim(self.limits.history_bytes);
+                Ok((
+                    Commit {
+                        version: Version(root.version),
+                        time,
+                        created,
+                    },
+                    change,
+                ))
+            }
+            Err(refusal) => {
+                self.abandon(&before);
+                Err(refusal)
+            }
+        }
+    }
+
+    fn try_commit(
+        &mut self,
+        transaction: &Transaction,
+        agent: &str,
+        time: Time,
+    ) -> Result<(Root, Vec<NodeId>, Change), Refusal> {
+        let mut work = apply::Work::new(self, agent, time)?;
+        work.require(&transaction.preconditions)?;
+        work.apply(&transaction.operations)?;
+        work.finish()
+    }
+
+    fn abandon(&mut self, before: &(Arc<Schema>, usize)) {
+        self.writer.allocator.abandoned();
+        self.schema = Arc::clone(&before.0);
+        self.writers.truncate(before.1);
+    }
+
+    fn publish(&mut self, root: Root) {
+        self.writer.arena.publish(&root);
+        self.writer.allocator.committed(self.root.version);
+        self.root = root;
+    }
+
+    fn reclaim(&mut self, keep_bytes: usize) {
+        let pinned = self.leases.values().min().copied();
+        self.writer
+            .allocator
+            .reclaim(&self.writer.arena, keep_bytes, pinned);
+    }
+
+    fn full(&self) -> Refusal {
+        Refusal::OutOfMemory {
+            bytes: self.bytes_in_use(),
+        }
+    }
+
+    fn write_schema(&mut self, root: &mut Root) -> Result<(), Full> {
+        // Encoding to memory cannot fail for these types; an empty blob is refused by readers.
+        let bytes = postcard::to_stdvec(&*self.schema).unwrap_or_default();
+        let old = root.schema;
+        root.schema = record::write_blob(&mut self.writer, &bytes)?;
+        root.schema_version += 1;
+        if old != 0 {
+            let words = record::blob_len(&self.writer.arena, old);
+            self.writer.retire(old, words);
+        }
+        Ok(())
+    }
+
+    /// The number that stands for an agent in attribute records.
+    fn writer_id(&mut self, agent: &str, root: &mut Root) -> Result<u16, Full> {
+        if let Some(index) = self.writers.iter().position(|name| name == agent) {
+            return Ok(index as u16);
+        }
+        let index = u16::try_from(self.writers.len()).map_err(|_| Full)?;
+        self.writers.push(agent.to_owned());
+        let bytes = postcard::to_stdvec(&self.writers).unwrap_or_default();
+        let old = root.writers;
+        root.writers = record::write_blob(&mut self.writer, &bytes)?;
+        if old != 0 {
+            let words = record::blob_len(&self.writer.arena, old);
+            self.writer.retire(old, words);
+        }
+        Ok(index)
+    }
+}
+
+impl Word {
+    /// Whether the word is zero; what a fresh segment is full of.
+    #[cfg(test)]
+    pub(crate) fn is_zero(&self) -> bool {
+        self.load() == 0
+    }
+}
+
+#[cfg(test)]
+mod tests;

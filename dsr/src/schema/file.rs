@@ -1,0 +1,178 @@
+//! Schema files: TOML with the tables `types`, `labels` and `attributes`. This file guarantees
+//! that every name a schema file uses is defined in it, and points at the one that is not.
+
+use super::{AttributeType, Schema, SchemaError, suggest};
+use crate::{TypeId, ValueKind};
+use miette::{Diagnostic, NamedSource, SourceSpan};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use thiserror::Error;
+use toml::Spanned;
+
+/// What is wrong with a schema file, and where.
+#[derive(Debug, Clone, Error, Diagnostic)]
+#[error("{message}")]
+#[diagnostic(code(schema))]
+pub struct SchemaFileError {
+    message: String,
+    #[source_code]
+    text: NamedSource<String>,
+    #[label("here")]
+    span: Option<SourceSpan>,
+    #[help]
+    help: Option<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    #[serde(default)]
+    open: bool,
+    #[serde(default)]
+    types: BTreeMap<Spanned<String>, Vec<Spanned<String>>>,
+    #[serde(default)]
+    labels: BTreeMap<Spanned<String>, LabelEnds>,
+    #[serde(default)]
+    attributes: BTreeMap<Spanned<String>, AttributeRow>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LabelEnds {
+    #[serde(default)]
+    from: Vec<Spanned<String>>,
+    #[serde(default)]
+    to: Vec<Spanned<String>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AttributeRow {
+    kind: Spanned<String>,
+    unit: Option<String>,
+    min: Option<f64>,
+    max: Option<f64>,
+}
+
+impl Schema {
+    /// Reads a schema file: `types` maps each type to its parents, `labels` each label to the
+    /// types it may start `from` and end at (`to`), `attributes` each attribute to its `kind`
+    /// (see [`ValueKind::name`]), `unit`, `min` and `max`. `open = true` lets other names in.
+    ///
+    /// # Errors
+    /// Broken TOML, an unknown key, kind or type name; with its place in the file.
+    pub fn from_toml(file_name: &str, text: &str) -> Result<Self, SchemaFileError> {
+        let error = |message: String, span: Option<std::ops::Range<usize>>, help| SchemaFileError {
+            message,
+            text: NamedSource::new(file_name, text.to_owned()),
+            span: span.map(Into::into),
+            help,
+        };
+        let file: File =
+            toml::from_str(text).map_err(|e| error(e.message().to_owned(), e.span(), None))?;
+        let mut schema = Self::open();
+        schema.parts.open = file.open;
+        let names: Vec<&str> = file
+            .types
+            .keys()
+            .map(|name| name.get_ref().as_str())
+            .collect();
+        let refused = |e: SchemaError, span| error(e.to_string(), Some(span), None);
+        // Parents may stand below their children, so that ids are given first.
+        for name in file.types.keys() {
+            schema
+                .add_type(name.get_ref(), &[])
+                .map_err(|e| refused(e, name.span()))?;
+        }
+        let look_up = |schema: &Self, list: &[Spanned<String>]| -> Result<Vec<TypeId>, _> {
+            list.iter()
+                .map(|name| {
+                    schema.find_type(name.get_ref()).ok_or_else(|| {
+                        let help = suggest(name.get_ref(), names.iter().copied())
+                            .map(|known| format!("did you mean `{known}`?"));
+                        let message = format!("unknown node type `{}`", name.get_ref());
+                        error(message, Some(name.span()), help)
+                    })
+                })
+                .collect()
+        };
+        for (index, (name, parents)) in file.types.iter().enumerate() {
+            let parents = look_up(&schema, parents)?;
+            schema.parts.types[index].parents = parents;
+            if schema.parts.types[index].parents.iter().any(|&parent| {
+                super::descends(
+                    &schema.parts.types,
+                    usize::from(parent.0),
+                    index,
+                    names.len(),
+                )
+            }) {
+                let message = format!("`{}` is its own ancestor", name.get_ref());
+                return Err(error(message, Some(name.span()), None));
+            }
+        }
+        schema.index_subtypes();
+        for (name, ends) in &file.labels {
+            let (from, to) = (look_up(&schema, &ends.from)?, look_up(&schema, &ends.to)?);
+            schema
+                .add_label(name.get_ref(), &from, &to)
+                .map_err(|e| refused(e, name.span()))?;
+        }
+        for (name, row) in file.attributes {
+            let kind = ValueKind::from_name(row.kind.get_ref()).ok_or_else(|| {
+                let known = ValueKind::ALL.map(ValueKind::name).join(", ");
+                let message = format!("unknown kind of value `{}`", row.kind.get_ref());
+                error(
+                    message,
+                    Some(row.kind.span()),
+                    Some(format!("one of {known}")),
+                )
+            })?;
+            let attribute = AttributeType {
+                name: name.get_ref().clone(),
+                kind: Some(kind),
+                unit: row.unit,
+                min: row.min,
+                max: row.max,
+            };
+            schema
+                .add_attribute(attribute)
+                .map_err(|e| refused(e, name.span()))?;
+        }
+        Ok(schema)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn place_of(text: &str) -> (String, String) {
+        let error = Schema::from_toml("s.toml", text).unwrap_err();
+        let span = error.span.unwrap();
+        let place = &text[span.offset()..span.offset() + span.len()];
+        (error.to_string(), place.to_owned())
+    }
+
+    #[test]
+    fn an_unknown_parent_is_pointed_at() {
+        let (message, place) = place_of("[types]\nthing = []\nroom = [\"thnig\"]\n");
+        assert_eq!(message, "unknown node type `thnig`");
+        assert_eq!(place, "\"thnig\"");
+    }
+
+    #[test]
+    fn a_circle_of_types_is_refused() {
+        let (message, _) = place_of("[types]\na = [\"b\"]\nb = [\"a\"]\n");
+        assert!(message.contains("its own ancestor"), "{message}");
+    }
+
+    #[test]
+    fn an_unknown_kind_is_pointed_at() {
+        let (message, place) = place_of("[attributes]\nx = { kind = \"f65\" }\n");
+        assert_eq!(
+            (message.as_str(), place.as_str()),
+            ("unknown kind of value `f65`", "\"f65\"")
+        );
+    }
+}

@@ -1,0 +1,563 @@
+//! Reading the graph as of one commit, in place. A snapshot copies nothing and holds nothing up;
+//! everything it gives is genuine: where the store has reused the version's memory meanwhile, the
+//! read says [`ReadError::SnapshotTooOld`] and never gives foreign or half-written data.
+
+use crate::arena::record::{self, AttributeRecord, EdgeRecord};
+use crate::arena::tree::{self, Key};
+use crate::arena::{Address, Arena, ReadError, Root, Word, trie};
+use crate::{
+    AttributeId, EdgeKey, LabelId, NodeId, Pose, Schema, Time, TypeId, Value, Version, WriterId,
+    pose_on_floor,
+};
+use nalgebra::Isometry2;
+use std::hash::Hasher;
+use std::sync::Arc;
+
+/// The graph as of one commit.
+///
+/// Cheap to clone and to hold; see [`ReadError::SnapshotTooOld`] for how long it can be read.
+#[derive(Debug, Clone)]
+pub struct Snapshot {
+    pub(crate) arena: Arc<Arena>,
+    pub(crate) root: Root,
+    pub(crate) schema: Arc<Schema>,
+}
+
+/// A node of a snapshot.
+#[derive(Debug, Clone, Copy)]
+pub struct Node<'a> {
+    snapshot: &'a Snapshot,
+    address: Address,
+    id: NodeId,
+    type_id: TypeId,
+}
+
+/// An edge of a snapshot.
+#[derive(Debug, Clone, Copy)]
+pub struct Edge<'a> {
+    snapshot: &'a Snapshot,
+    address: Address,
+    key: EdgeKey,
+}
+
+/// An attribute as it was last written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Attribute {
+    /// Which.
+    pub name: AttributeId,
+    /// Its value.
+    pub value: Value,
+    /// The commit that wrote it.
+    pub version: Version,
+    /// When.
+    pub time: Time,
+    /// Who.
+    pub writer: WriterId,
+}
+
+pub(crate) fn name_hash(name: &str) -> u64 {
+    let mut hasher = rustc_hash::FxHasher::default();
+    hasher.write(name.as_bytes());
+    hasher.finish()
+}
+
+impl Snapshot {
+    /// The version that this is the state of.
+    pub fn version(&self) -> Version {
+        Version(self.root.version)
+    }
+
+    /// When that version was committed.
+    pub fn time(&self) -> Time {
+        self.root.time()
+    }
+
+    /// The names in use.
+    pub fn schema(&self) -> &Schema {
+        &self.schema
+    }
+
+    /// How many nodes there are.
+    pub fn node_count(&self) -> u64 {
+        self.root.node_count
+    }
+
+    /// How many edges there are.
+    pub fn edge_count(&self) -> u64 {
+        self.root.edge_count
+    }
+
+    /// Whether everything read so far was genuine, and reading can go on.
+    ///
+    /// # Errors
+    /// [`ReadError::SnapshotTooOld`].
+    pub fn check(&self) -> Result<(), ReadError> {
+        self.arena.check(self.root.version)
+    }
+
+    /// Turns the outcome of a walk through the arena into what the caller may see.
+    fn genuine<T>(&self, outcome: Result<T, Address>) -> Result<T, ReadError> {
+        match outcome {
+            Ok(found) => self.check().map(|()| found),
+            Err(address) => Err(self.arena.broken(self.root.version, address)),
+        }
+    }
+
+    fn node_at(&self, address: Address) -> Result<Node<'_>, ReadError> {
+        let read = || {
+            let words = self.arena.from(address)?;
+            Some((
+                NodeId(words.first()?.load()),
+                TypeId(words.get(1)?.load() as u16),
+            ))
+        };
+        let (id, type_id) = self.genuine(read().ok_or(address))?;
+        Ok(Node {
+            snapshot: self,
+            address,
+            id,
+            type_id,
+        })
+    }
+
+    /// The node of that id, if it is there.
+    ///
+    /// # Errors
+    /// [`ReadError`], as for every read of a snapshot.
+    pub fn find_node(&self, id: NodeId) -> Result<Option<Node<'_>>, ReadError> {
+        self.genuine(trie::find(&self.arena, self.root.nodes, id.0))?
+            .map(|address| self.node_at(address))
+            .transpose()
+    }
+
+    /// The node of that name, if it is there.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn find_node_by_name(&self, name: &str) -> Result<Option<Node<'_>>, ReadError> {
+        let hash = name_hash(name);
+        let mut range = self.range(self.root.names, [hash, 0], [hash, u64::MAX])?;
+        while let Some((key, _)) = self.genuine(range.next(&self.arena))? {
+            if let Some(node) = self.find_node(NodeId(key[1]))?
+                && node.name()? == name
+            {
+                return Ok(Some(node));
+            }
+        }
+        Ok(None)
+    }
+
+    fn range(&self, root: Address, from: Key, to: Key) -> Result<tree::Range, ReadError> {
+        self.genuine(tree::Range::new(&self.arena, root, from, to))
+    }
+
+    /// All nodes, in an order that depends on their ids alone.
+    pub fn nodes(&self) -> impl Iterator<Item = Result<Node<'_>, ReadError>> {
+        let mut walk = Some(trie::Walk::new(self.root.nodes, self.root.node_count));
+        std::iter::from_fn(move || {
+            let next = self.genuine(walk.as_mut()?.next(&self.arena));
+            let next = next.and_then(|address| address.map(|a| self.node_at(a)).transpose());
+            if !matches!(next, Ok(Some(_))) {
+                walk = None;
+            }
+            next.transpose()
+        })
+    }
+
+    /// The nodes of a type or its subtypes: type by type, each by ascending id.
+    pub fn nodes_of_type(
+        &self,
+        type_id: TypeId,
+    ) -> impl Iterator<Item = Result<Node<'_>, ReadError>> {
+        self.schema
+            .subtypes(type_id)
+            .iter()
+            .flat_map(move |&exact| self.nodes_of_exact_type(exact))
+    }
+
+    fn nodes_of_exact_type(
+        &self,
+        exact: TypeId,
+    ) -> impl Iterator<Item = Result<Node<'_>, ReadError>> {
+        let entry = record::directory_entry(&self.arena, self.root.types, exact.0);
+        let root = self.genuine(entry).map(|(tree, _)| tree);
+        self.scan(root, [0, 0], [u64::MAX, u64::MAX]).map(|entry| {
+            let (key, _) = entry?;
+            self.find_node(NodeId(key[0]))?
+                .ok_or(ReadError::Damaged { address: 0 })
+        })
+    }
+
+    /// How many nodes are of a type or its subtypes.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn count_of_type(&self, type_id: TypeId) -> Result<u64, ReadError> {
+        self.schema
+            .subtypes(type_id)
+            .iter()
+            .try_fold(0, |sum, exact| {
+                let entry = record::directory_entry(&self.arena, self.root.types, exact.0);
+                Ok(sum + self.genuine(entry)?.1)
+            })
+    }
+
+    /// The edges of a label, by ascending source and target.
+    pub fn edges_of_label(
+        &self,
+        label: LabelId,
+    ) -> impl Iterator<Item = Result<EdgeKey, ReadError>> {
+        let entry = record::directory_entry(&self.arena, self.root.labels, label.0);
+        let root = self.genuine(entry).map(|(tree, _)| tree);
+        self.scan(root, [0, 0], [u64::MAX, u64::MAX])
+            .map(move |entry| {
+                entry.map(|([from, to], _)| EdgeKey {
+                    from: NodeId(from),
+                    label,
+                    to: NodeId(to),
+                })
+            })
+    }
+
+    /// How many edges have a label.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn count_of_label(&self, label: LabelId) -> Result<u64, ReadError> {
+        let entry = record::directory_entry(&self.arena, self.root.labels, label.0);
+        Ok(self.genuine(entry)?.1)
+    }
+
+    fn scan(&self, root: Result<Address, ReadError>, from: Key, to: Key) -> Scan<'_> {
+        let range = root.and_then(|root| self.range(root, from, to));
+        Scan {
+            snapshot: self,
+            range: Some(range),
+        }
+    }
+
+    /// The edge of that key, if it is there.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn find_edge(&self, key: EdgeKey) -> Result<Option<Edge<'_>>, ReadError> {
+        let Some(node) = self.find_node(key.from)? else {
+            return Ok(None);
+        };
+        let root = node.word(4)?;
+        let found = self.genuine(tree::find(
+            &self.arena,
+            root,
+            [u64::from(key.label.0), key.to.0],
+        ))?;
+        Ok(found.map(|address| Edge {
+            snapshot: self,
+            address,
+            key,
+        }))
+    }
+
+    /// The name of an agent that wrote an attribute.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn writer_name(&self, writer: WriterId) -> Result<String, ReadError> {
+        Ok(self
+            .writers()?
+            .into_iter()
+            .nth(usize::from(writer.0))
+            .unwrap_or_default())
+    }
+
+    pub(crate) fn writers(&self) -> Result<Vec<String>, ReadError> {
+        if self.root.writers == 0 {
+            return Ok(Vec::new());
+        }
+        let bytes = self.genuine(record::read_blob(&self.arena, self.root.writers))?;
+        postcard::from_bytes(&bytes).map_err(|_| ReadError::Damaged {
+            address: self.root.writers,
+        })
+    }
+
+    /// Where `node` is on the floor of the world: the product of the `pose` edges' `transform`s
+    /// from the root of its kinematic tree down to it. `None` where no `pose` edge leads to it.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn world_from(&self, node: NodeId) -> Result<Option<Isometry2<f64>>, ReadError> {
+        Ok(self.pose_in_world(node)?.as_ref().map(pose_on_floor))
+    }
+
+    /// Where `node` is in the world, in space; see [`Self::world_from`].
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn pose_in_world(&self, node: NodeId) -> Result<Option<Pose>, ReadError> {
+        let (Some(label), Some(transform)) = (
+            self.schema.find_label("pose"),
+            self.schema.find_attribute("transform"),
+        ) else {
+            return Ok(None);
+        };
+        let mut world_from_node: Option<Pose> = None;
+        let mut child = node;
+        // A kinematic tree has no circle; this bounds the walk where somebody made one.
+        for _ in 0..64 {
+            let Some(found) = self.find_node(child)? else {
+                break;
+            };
+            let Some(key) = found.in_edges_of(label).next().transpose()? else {
+                break;
+            };
+            let Some(edge) = self.find_edge(key)? else {
+                break;
+            };
+            let Some(Value::Pose(step)) = edge.attribute(transform)?.map(|a| a.value) else {
+                break;
+            };
+            world_from_node = Some(world_from_node.map_or(step, |below| step * below));
+            child = key.from;
+        }
+        Ok(world_from_node)
+    }
+}
+
+/// What nodes and edges have in common: a record with a table of attributes.
+fn find_attribute(
+    snapshot: &Snapshot,
+    rows: Option<&[Word]>,
+    address: Address,
+    name: AttributeId,
+) -> Result<Option<Attribute>, ReadError> {
+    let rows = rows.ok_or_else(|| snapshot.arena.broken(snapshot.root.version, address))?;
+    for word in rows {
+        let (attribute, at) = record::split_row(word.load());
+        if attribute == name.0 {
+            return read_attribute(snapshot, name, at).map(Some);
+        }
+    }
+    snapshot.check().map(|()| None)
+}
+
+fn read_attribute(
+    snapshot: &Snapshot,
+    name: AttributeId,
+    address: Address,
+) -> Result<Attribute, ReadError> {
+    let read = snapshot.genuine(AttributeRecord::read(&snapshot.arena, address))?;
+    Ok(Attribute {
+        name,
+        value: read.value,
+        version: Version(read.version),
+        time: Time::from_nanoseconds(read.time),
+        writer: WriterId(read.writer),
+    })
+}
+
+fn all_attributes(snapshot: &Snapshot, rows: &[u64]) -> Result<Vec<Attribute>, ReadError> {
+    rows.iter()
+        .map(|&row| {
+            let (attribute, address) = record::split_row(row);
+            read_attribute(snapshot, AttributeId(attribute), address)
+        })
+        .collect()
+}
+
+impl<'a> Node<'a> {
+    /// The node's id.
+    pub fn id(&self) -> NodeId {
+        self.id
+    }
+
+    /// The node's type.
+    pub fn type_id(&self) -> TypeId {
+        self.type_id
+    }
+
+    /// The name of the node's type.
+    pub fn type_name(&self) -> &'a str {
+        self.snapshot.schema.type_name(self.type_id)
+    }
+
+    fn word(&self, index: usize) -> Result<u64, ReadError> {
+        let words = self
+            .snapshot
+            .arena
+            .from(self.address)
+            .and_then(|words| words.get(index));
+        self.snapshot
+            .genuine(words.map(Word::load).ok_or(self.address))
+    }
+
+    /// The node's name.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn name(&self) -> Result<String, ReadError> {
+        let address = self.word(2)?;
+        let bytes = self
+            .snapshot
+            .genuine(record::read_blob(&self.snapshot.arena, address))?;
+        String::from_utf8(bytes).map_err(|_| ReadError::Damaged { address })
+    }
+
+    /// The commit that last changed the node's type or attributes.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn version(&self) -> Result<Version, ReadError> {
+        self.word(3).map(Version)
+    }
+
+    /// One attribute, if the node has it.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn attribute(&self, name: AttributeId) -> Result<Option<Attribute>, ReadError> {
+        let words = self.snapshot.arena.from(self.address);
+        let rows =
+            words.and_then(|words| record::table(words, record::NODE_HEADER, words.get(1)?.load()));
+        find_attribute(self.snapshot, rows, self.address, name)
+    }
+
+    /// The value of the attribute of that name, if the node has it.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn value(&self, name: &str) -> Result<Option<Value>, ReadError> {
+        let Some(name) = self.snapshot.schema.find_attribute(name) else {
+            return Ok(None);
+        };
+        Ok(self.attribute(name)?.map(|attribute| attribute.value))
+    }
+
+    /// All attributes, by id of their names.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn attributes(&self) -> Result<Vec<Attribute>, ReadError> {
+        let record = record::NodeRecord::read(&self.snapshot.arena, self.address);
+        all_attributes(self.snapshot, &self.snapshot.genuine(record)?.rows)
+    }
+
+    fn adjacent(self, tree: usize, labels: [u16; 2]) -> Scan<'a> {
+        let [from, to] = labels.map(u64::from);
+        self.snapshot
+            .scan(self.word(tree), [from, 0], [to, u64::MAX])
+    }
+
+    /// The edges that start here, by label and target.
+    pub fn out_edges(&self) -> impl Iterator<Item = Result<EdgeKey, ReadError>> + use<'a> {
+        self.outgoing([0, u16::MAX])
+    }
+
+    /// The edges of a label that start here, by target.
+    pub fn out_edges_of(
+        &self,
+        label: LabelId,
+    ) -> impl Iterator<Item = Result<EdgeKey, ReadError>> + use<'a> {
+        self.outgoing([label.0; 2])
+    }
+
+    fn outgoing(
+        &self,
+        labels: [u16; 2],
+    ) -> impl Iterator<Item = Result<EdgeKey, ReadError>> + use<'a> {
+        let node = *self;
+        node.adjacent(4, labels).map(move |entry| {
+            let ([label, to], _) = entry?;
+            Ok(EdgeKey {
+                from: node.id,
+                label: LabelId(label as u16),
+                to: NodeId(to),
+            })
+        })
+    }
+
+    /// The edges that end here, by label and source.
+    pub fn in_edges(&self) -> impl Iterator<Item = Result<EdgeKey, ReadError>> + use<'a> {
+        self.incoming([0, u16::MAX])
+    }
+
+    /// The edges of a label that end here, by source.
+    pub fn in_edges_of(
+        &self,
+        label: LabelId,
+    ) -> impl Iterator<Item = Result<EdgeKey, ReadError>> + use<'a> {
+        self.incoming([label.0; 2])
+    }
+
+    fn incoming(
+        &self,
+        labels: [u16; 2],
+    ) -> impl Iterator<Item = Result<EdgeKey, ReadError>> + use<'a> {
+        let node = *self;
+        node.adjacent(5, labels).map(move |entry| {
+            let ([label, from], _) = entry?;
+            Ok(EdgeKey {
+                from: NodeId(from),
+                label: LabelId(label as u16),
+                to: node.id,
+            })
+        })
+    }
+}
+
+/// Walks a part of a tree.
+struct Scan<'a> {
+    snapshot: &'a Snapshot,
+    range: Option<Result<tree::Range, ReadError>>,
+}
+
+impl Iterator for Scan<'_> {
+    type Item = Result<tree::Entry, ReadError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let next = match self.range.as_mut()? {
+            Ok(range) => self.snapshot.genuine(range.next(&self.snapshot.arena)),
+            Err(error) => Err(*error),
+        };
+        if !matches!(next, Ok(Some(_))) {
+            self.range = None;
+        }
+        next.transpose()
+    }
+}
+
+impl Edge<'_> {
+    /// What names the edge.
+    pub fn key(&self) -> EdgeKey {
+        self.key
+    }
+
+    /// One attribute, if the edge has it.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn attribute(&self, name: AttributeId) -> Result<Option<Attribute>, ReadError> {
+        let words = self.snapshot.arena.from(self.address);
+        let rows =
+            words.and_then(|words| record::table(words, record::EDGE_HEADER, words.get(2)?.load()));
+        find_attribute(self.snapshot, rows, self.address, name)
+    }
+
+    /// The value of the attribute of that name, if the edge has it.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn value(&self, name: &str) -> Result<Option<Value>, ReadError> {
+        let Some(name) = self.snapshot.schema.find_attribute(name) else {
+            return Ok(None);
+        };
+        Ok(self.attribute(name)?.map(|attribute| attribute.value))
+    }
+
+    /// All attributes, by id of their names.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn attributes(&self) -> Result<Vec<Attribute>, ReadError> {
+        let record = EdgeRecord::read(&self.snapshot.arena, self.address);
+        all_attributes(self.snapshot, &self.snapshot.genuine(record)?.rows)
+    }
+}
