@@ -1,6 +1,11 @@
 //! Takes the robot where its task says: a path on the social grid, an elastic band, and control.
+pub mod anticipation;
 pub mod band;
 pub mod control;
+pub mod ground;
+pub mod navigator;
 pub mod obstacles;
 pub mod path;
 pub mod people;
+mod planner;
+pub mod target;
