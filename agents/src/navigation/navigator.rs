@@ -173,6 +173,7 @@ struct Course {
     backing_until: Option<Time>,
     /// Since when there has been no way, or no sight of the person.
     hindered: Option<Time>,
+    hindrance: Option<Hindrance>,
     at_place: bool,
 }
 
@@ -319,12 +320,17 @@ impl Navigator {
             course.planned = None;
         }
         self.band.follow(view.robot.position, 2.0);
-        let found = self.keep_planned(course, grid, view);
-        if let Err(hindrance) = found {
-            return hindered(course, view.now, hindrance, self.config.unreachable_after);
-        }
-        course.hindered = None;
-        self.drive(course, view)
+        let decision = self
+            .keep_planned(course, grid, view)
+            .err()
+            .and_then(|hindrance| {
+                let since = *course.hindered.get_or_insert(view.now);
+                let given_up = view.now.since(since) > self.config.unreachable_after;
+                // A way found earlier still leads on; people who block a new one will walk away.
+                let stands = self.band.points().is_empty() || given_up;
+                stands.then(|| (STAND, hindrance.status(given_up)))
+            });
+        decision.unwrap_or_else(|| self.drive(course, view))
     }
 
     /// Takes in the laser and the map. Whoever walks will be elsewhere when the robot gets there, so
@@ -415,18 +421,19 @@ impl Navigator {
         let age = course
             .planned
             .map_or(f64::INFINITY, |planned| view.now.since(planned));
-        let moved = person.is_some_and(|person| has_moved(course.person, person.position()));
-        if self.band.points().is_empty() || course.planned.is_none() || moved && age >= 0.5 {
-            return self.plan(course, grid, view, person, Care::Map);
+        if age < 0.5 {
+            return course.hindrance.map_or(Ok(()), Err);
         }
+        let moved = person.is_some_and(|person| has_moved(course.person, person.position()));
         let now = price(grid, self.band.points());
         course.price = course.price.min(now.cost);
-        if (now.blocked || now.cost > 1.3 * course.price + 1.5) && age >= 0.5 {
+        let dearer = now.blocked || now.cost > 1.3 * course.price + 1.5;
+        if self.band.points().is_empty() || moved || dearer || course.hindrance.is_some() {
             return self.plan(course, grid, view, person, Care::Map);
         }
         let walkers = view.inputs.people.iter().any(Person::is_walking);
         if view.inputs.social && walkers && age >= self.config.review {
-            return self.review(course, grid, view, person);
+            self.review(course, grid, view, person);
         }
         Ok(())
     }
@@ -438,7 +445,7 @@ impl Navigator {
         grid: &CostGrid,
         view: &View,
         person: Option<&Person>,
-    ) -> Result<(), Hindrance> {
+    ) {
         let old = std::mem::take(&mut self.band);
         let kept = course.clone();
         let found = self.plan(course, grid, view, person, Care::Map);
@@ -450,9 +457,7 @@ impl Navigator {
                 planned: Some(view.now),
                 ..kept
             };
-            return Ok(());
         }
-        found
     }
 
     /// Plans a path and lays a band along it.
@@ -465,6 +470,7 @@ impl Navigator {
         care: Care,
     ) -> Result<(), Hindrance> {
         self.plans += 1;
+        course.planned = Some(view.now);
         let robot = view.robot.position;
         self.planner.load(grid);
         if view.inputs.social {
@@ -482,14 +488,16 @@ impl Navigator {
             let reach = (view.inputs.limits.radius, 4.0);
             self.planner.block(&self.obstacles, &standing, robot, reach);
         }
-        let (destination, line) = self.line(course, grid, robot, person)?;
+        let found = self.line(course, grid, robot, person);
+        course.hindrance = found.as_ref().err().copied();
+        let (destination, line) = found?;
+        course.hindered = None;
         let line_end = line[line.len() - 1];
         course.destination = Some(Destination {
             point: line_end,
             ..destination
         });
         course.person = person.map_or(robot, Person::position);
-        course.planned = Some(view.now);
         course.at_place = false;
         self.band = Band::new(&line, &self.config.gains);
         self.relax(view, 20);
@@ -587,11 +595,9 @@ impl Navigator {
         }
         if waited > due || broken && age >= 0.5 {
             let person = person_of(&course.task, view.inputs.people);
-            if let Some(grid) = view.inputs.grid
-                && let Err(hindrance) = self.plan(course, grid, view, person, Care::Laser)
-            {
-                course.planned = Some(view.now);
-                return hindered(course, view.now, hindrance, self.config.unreachable_after);
+            if let Some(grid) = view.inputs.grid {
+                // Without a new way the old one is as good as any.
+                course.hindrance = self.plan(course, grid, view, person, Care::Laser).err();
             }
         }
         let limits = &view.inputs.limits;
@@ -668,18 +674,16 @@ enum Hindrance {
     NoPerson,
 }
 
-/// Stands and hopes, or gives up when it has lasted too long.
-fn hindered(course: &mut Course, now: Time, hindrance: Hindrance, patience: f64) -> Decision {
-    let since = *course.hindered.get_or_insert(now);
-    let given_up = now.since(since) > patience;
-    let status = match hindrance {
-        Hindrance::NoPath(error) if given_up => Status::Failed(Failure::NoPath(error)),
-        Hindrance::RegionBlocked if given_up => Status::Failed(Failure::RegionBlocked),
-        Hindrance::NoPerson if given_up => Status::Failed(Failure::PersonUnseen),
-        Hindrance::NoPath(_) | Hindrance::RegionBlocked => Status::Waiting(Cause::NoPath),
-        Hindrance::NoPerson => Status::Waiting(Cause::NoPerson),
-    };
-    (STAND, status)
+impl Hindrance {
+    fn status(self, given_up: bool) -> Status {
+        match self {
+            Self::NoPath(error) if given_up => Status::Failed(Failure::NoPath(error)),
+            Self::RegionBlocked if given_up => Status::Failed(Failure::RegionBlocked),
+            Self::NoPerson if given_up => Status::Failed(Failure::PersonUnseen),
+            Self::NoPath(_) | Self::RegionBlocked => Status::Waiting(Cause::NoPath),
+            Self::NoPerson => Status::Waiting(Cause::NoPerson),
+        }
+    }
 }
 
 impl Course {
@@ -701,6 +705,7 @@ impl Course {
             recoveries: 0,
             backing_until: None,
             hindered: None,
+            hindrance: None,
             at_place: false,
         }
     }
