@@ -4,3 +4,4 @@
 pub mod grid;
 pub mod messages;
 pub mod navigation;
+pub mod social_mapping;
