@@ -1,11 +1,11 @@
 //! The people around the robot, where they will be, and how deep a place lies in their space.
 //! This file guarantees that a place's zone is exactly the one that the metrics count it to.
 
+use crate::social_mapping::AsymmetricGaussian;
 use nalgebra::{Isometry2, Point2, Vector2};
 
-/// The standard deviations of a personal space ahead, to the sides and behind, metres: preset
-/// `hall` of READING.md item 2.
-const HALL: [f64; 3] = [1.0, 0.75, 0.5];
+/// The shape of every personal space.
+const SPACE: AsymmetricGaussian = AsymmetricGaussian::HALL;
 
 /// Below this squared deviation a place lies in the intimate space: density 0.9 (READING.md item 6).
 pub const INTIMATE: f64 = 0.210_721_031_315_652_6;
@@ -73,22 +73,25 @@ impl Presence {
     /// How far `place` is from the person in standard deviations of their space, squared: compare
     /// with [`INTIMATE`], [`PERSONAL`] and [`SOCIAL`].
     pub fn squared_deviation(&self, place: Point2<f64>) -> f64 {
-        let offset = place - self.position;
-        let ahead = offset.dot(&self.facing);
-        let aside = self.facing.perp(&offset);
-        let [front, side, rear] = HALL;
-        (ahead / if ahead >= 0.0 { front } else { rear }).powi(2) + (aside / side).powi(2)
+        SPACE.squared_deviation(self.own_frame(place))
     }
 
     /// The direction, not normalised, in which [`Presence::squared_deviation`] grows fastest.
     pub fn gradient(&self, place: Point2<f64>) -> Vector2<f64> {
-        let offset = place - self.position;
-        let ahead = offset.dot(&self.facing);
-        let aside = self.facing.perp(&offset);
-        let [front, side, rear] = HALL;
-        let along = if ahead >= 0.0 { front } else { rear };
+        let place = self.own_frame(place);
+        let along = if place.x >= 0.0 {
+            SPACE.front
+        } else {
+            SPACE.rear
+        };
         let left = Vector2::new(-self.facing.y, self.facing.x);
-        self.facing * (ahead / along.powi(2)) + left * (aside / side.powi(2))
+        self.facing * (place.x / along.powi(2)) + left * (place.y / SPACE.side.powi(2))
+    }
+
+    /// `place` as the person sees it: x ahead, y to the left.
+    fn own_frame(&self, place: Point2<f64>) -> Point2<f64> {
+        let offset = place - self.position;
+        Point2::new(offset.dot(&self.facing), self.facing.perp(&offset))
     }
 }
 
