@@ -11,6 +11,7 @@ mod arena;
 mod change;
 mod graph;
 mod ids;
+mod process;
 mod schema;
 #[allow(
     unsafe_code,
@@ -26,6 +27,7 @@ pub use arena::ReadError;
 pub use change::{Change, EdgeChange, Filter, NodeChange, RuleApplication, Touch};
 pub use graph::{Graph, Image, Limits, RuleEngine};
 pub use ids::{AttributeId, EdgeKey, Epoch, LabelId, NodeId, TypeId, Version, WriterId};
+pub use process::{Pace, TurnError, Turns, done_line, turn_line};
 pub use schema::{
     AttributeType, Label, NameKind, NodeType, Schema, SchemaError, SchemaFileError, suggest,
 };
