@@ -91,11 +91,13 @@ pub struct Choice {
 /// Predictions and memory that serve one choice after the other.
 #[derive(Debug, Clone, Default)]
 pub struct Anticipation {
-    /// Where everybody near is, step by step.
-    seen: Vec<Seen>,
-    near: usize,
-    /// From each point of the line to its end, metres.
-    to_end: Vec<f64>,
+    /// Where everybody near who walks is, step by step.
+    walking: Vec<Seen>,
+    walkers: usize,
+    /// Everybody near who stands.
+    standing: Vec<Seen>,
+    /// From each point of the line to its end: metres, and what the spaces of those who stand cost.
+    to_end: Vec<(f64, f64)>,
     last: Option<Manoeuvre>,
 }
 
@@ -110,7 +112,7 @@ impl Anticipation {
         self.predict(robot, scene);
         let full = Manoeuvre::Along(1.0);
         let mut best = (self.judge(robot, scene, full, f64::INFINITY), full);
-        let trivial = self.near == 0;
+        let trivial = self.walkers + self.standing.len() == 0;
         if !trivial {
             for manoeuvre in candidates(robot, scene.line, self.last) {
                 let bonus = if self.last == Some(manoeuvre) {
@@ -140,23 +142,33 @@ impl Anticipation {
 
     fn predict(&mut self, robot: &Unicycle, scene: &Scene) {
         let near = |person: &&Person| distance(&person.position(), &robot.position) < SIGHT;
-        self.near = scene.people.iter().filter(near).count();
-        self.seen.clear();
+        let seen = |person: &Person, time: f64| Seen {
+            presence: person.predicted(time),
+            border: if scene.addressee == Some(&person.name) {
+                PERSONAL
+            } else {
+                BORDER
+            },
+        };
+        let people = || scene.people.iter().filter(near);
+        self.standing.clear();
+        self.standing
+            .extend(people().filter(|p| !p.is_walking()).map(|p| seen(p, 0.0)));
+        self.walkers = people().filter(|p| p.is_walking()).count();
+        self.walking.clear();
         for step in 1..=STEPS {
-            self.seen
-                .extend(scene.people.iter().filter(near).map(|person| Seen {
-                    presence: person.predicted(step as f64 * STEP),
-                    border: if scene.addressee == Some(&person.name) {
-                        PERSONAL
-                    } else {
-                        BORDER
-                    },
-                }));
+            let walkers = people().filter(|p| p.is_walking());
+            self.walking
+                .extend(walkers.map(|p| seen(p, step as f64 * STEP)));
         }
         self.to_end.clear();
-        self.to_end.resize(scene.line.len(), 0.0);
+        self.to_end.resize(scene.line.len(), (0.0, 0.0));
+        let pace = scene.limits.max_speed.max(0.05);
         for k in (1..scene.line.len()).rev() {
-            self.to_end[k - 1] = self.to_end[k] + distance(&scene.line[k - 1], &scene.line[k]);
+            let (length, cost) = self.to_end[k];
+            let step = distance(&scene.line[k - 1], &scene.line[k]);
+            let rate = intrusion(scene.line[k - 1], &self.standing, scene.limits.radius);
+            self.to_end[k - 1] = (length + step, cost + rate * step / pace);
         }
     }
 
@@ -182,21 +194,32 @@ impl Anticipation {
             } else {
                 robot = next;
             }
-            let then = &self.seen[step * self.near..(step + 1) * self.near];
-            cost +=
-                STEP * (-time / TRUST).exp() * intrusion(robot.position, then, scene.limits.radius);
+            let walking = &self.walking[step * self.walkers..(step + 1) * self.walkers];
+            let radius = scene.limits.radius;
+            let met = (-time / TRUST).exp() * intrusion(robot.position, walking, radius);
+            // Who stands will still stand there later: putting it off gains nothing.
+            cost += STEP * met.max(intrusion(robot.position, &self.standing, radius));
             if cost >= limit {
                 return cost;
             }
+            // What happens after the task has ended is no matter of how to carry it out.
+            if scene
+                .line
+                .last()
+                .is_some_and(|end| distance(end, &robot.position) < REACHED)
+            {
+                return cost;
+            }
         }
-        let rest = self.remaining(robot.position, rollout.next, scene);
+        let (rest, spaces) = self.remaining(robot.position, rollout.next, scene);
         let pressing = 1.0 + scene.waited / 6.0;
-        cost + pressing * rest / scene.limits.max_speed.max(0.05)
+        cost + spaces + pressing * rest / scene.limits.max_speed.max(0.05)
     }
 
-    /// How far it still is from `place` to the goal: straight to the farthest point of the line that
-    /// nothing hides, looking a few metres on from point `next`, and then along the line.
-    fn remaining(&self, place: Point2<f64>, next: usize, scene: &Scene) -> f64 {
+    /// How far it still is from `place` to the goal, metres, and what the spaces on the way cost:
+    /// straight to the farthest point of the line that nothing hides, looking a few metres on from
+    /// point `next`, and then along the line.
+    fn remaining(&self, place: Point2<f64>, next: usize, scene: &Scene) -> (f64, f64) {
         let line = scene.line;
         let last = (next + 16).min(line.len().saturating_sub(1));
         let open = |k: &usize| {
@@ -211,8 +234,9 @@ impl Anticipation {
         let seen = (0..=last).rev().step_by(2).find(open);
         let hidden = if seen.is_some() { 0.0 } else { 2.0 };
         let join = seen.unwrap_or(next.min(last));
-        line.get(join).map_or(0.0, |point| {
-            hidden + distance(point, &place) + self.to_end[join]
+        line.get(join).map_or((0.0, 0.0), |point| {
+            let (length, cost) = self.to_end[join];
+            (hidden + distance(point, &place) + length, cost)
         })
     }
 }

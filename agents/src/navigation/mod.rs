@@ -2,6 +2,7 @@
 pub mod anticipation;
 pub mod band;
 pub mod control;
+pub mod graph;
 pub mod ground;
 pub mod navigator;
 pub mod obstacles;
@@ -9,3 +10,5 @@ pub mod path;
 pub mod people;
 mod planner;
 pub mod target;
+#[cfg(test)]
+mod testing;

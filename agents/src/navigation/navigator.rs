@@ -227,6 +227,34 @@ impl Navigator {
         Output { command, status }
     }
 
+    /// One step of turning in place toward `place`, without a task.
+    pub fn face(&mut self, now: Time, inputs: &Inputs, place: Option<Point2<f64>>) -> Output {
+        self.course = None;
+        self.band = Band::default();
+        let wanted = self.view(now, inputs).map(|view| {
+            let turn = place.map_or(STAND, |place| {
+                let way = place - view.robot.position;
+                turn_to(
+                    &view.robot,
+                    way.y.atan2(way.x),
+                    self.config.heading_tolerance,
+                )
+            });
+            (turn, view.robot.motion)
+        });
+        let (motion, status) = match wanted {
+            Err(cause) => (STAND, Status::Waiting(cause)),
+            Ok((wanted, now)) => (inputs.limits.reachable(now, wanted, 0.1), Status::Moving),
+        };
+        let command = VelocityCommand {
+            time: now,
+            linear: motion.linear,
+            angular: motion.angular,
+        };
+        self.last = Some(command);
+        Output { command, status }
+    }
+
     /// What the robot sees, or what is missing for it to move at all.
     fn view<'a>(&self, now: Time, inputs: &'a Inputs<'a>) -> Result<View<'a>, Cause> {
         let fresh = |time: Time| now.since(time) <= self.config.patience;

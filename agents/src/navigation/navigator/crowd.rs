@@ -4,6 +4,7 @@
 use super::*;
 use crate::grid::{BLOCKED, FREE};
 use crate::navigation::people::{INTIMATE, PERSONAL, SOCIAL};
+use crate::navigation::testing::scan;
 use nalgebra::{Isometry2, Vector2};
 use std::f64::consts::PI;
 
@@ -53,36 +54,6 @@ fn walk(people: &mut [Person]) {
     for person in people {
         let x = &mut person.world_from_person.translation.vector.x;
         *x = (*x + person.velocity.x * STEP + 5.0).rem_euclid(SIZE.0 + 10.0) - 5.0;
-    }
-}
-
-/// 360 beams against the outer walls and everybody's body.
-pub(super) fn scan(now: Time, robot: &Unicycle, people: &[Person], walls: &[Wall]) -> LaserScan {
-    let step = PI / 180.0;
-    let beam = |k: usize| {
-        let angle = robot.heading - PI + step * k as f64;
-        let way = Vector2::new(angle.cos(), angle.sin());
-        let bodies = people.iter().filter_map(|person| {
-            let to = person.position() - robot.position;
-            let along = to.dot(&way);
-            let miss = person.radius.powi(2) - (to.norm_squared() - along * along);
-            (along > 0.0 && miss > 0.0).then(|| along - miss.sqrt())
-        });
-        let walls = walls.iter().filter_map(|[from, to]| {
-            let (along, across) = (to - from, robot.position - from);
-            let parallel = way.perp(&along);
-            let range = along.perp(&across) / parallel;
-            let share = way.perp(&across) / parallel;
-            (parallel.abs() > 1e-9 && range > 0.0 && (0.0..=1.0).contains(&share)).then_some(range)
-        });
-        bodies.chain(walls).fold(10.0, f64::min) as f32
-    };
-    LaserScan {
-        time: now,
-        angle_min: -PI,
-        angle_step: step,
-        range_max: 10.0,
-        ranges: (0..360).map(beam).collect(),
     }
 }
 
