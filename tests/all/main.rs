@@ -9,5 +9,6 @@ mod architecture;
 mod dependencies;
 mod documentation;
 mod graph;
+mod run;
 mod support;
 mod tree;
