@@ -5,6 +5,8 @@
 //! of scenario, seed and inputs.
 #![forbid(unsafe_code)]
 
+pub mod metrics;
+pub mod report;
 pub mod scenario;
 pub mod tracks;
 pub mod world;
