@@ -17,6 +17,8 @@ mod value;
 
 pub use diagnostic::{Invalid, LoadError, Problem, ProblemKind};
 pub use load::MAIN_FILE;
+#[cfg(test)]
+pub(crate) use space::CLASSES;
 
 use dsr::Time;
 use nalgebra::{Isometry2, Point2, Vector2};

@@ -10,16 +10,17 @@ use nalgebra::{Point2, Vector2};
 use std::ops::Range;
 
 /// The classes of object that the vocabulary knows.
-pub(crate) const CLASSES: [&str; 9] = [
+pub(crate) const CLASSES: [&str; 10] = [
     "object",
-    "table",
-    "tv",
-    "stretcher",
-    "seat",
+    "bed",
     "board",
-    "toilet",
-    "plant",
     "cupboard",
+    "plant",
+    "seat",
+    "stretcher",
+    "table",
+    "toilet",
+    "tv",
 ];
 
 pub(super) fn rooms(scenario: &Table<'_>, names: &mut Names<'_>) -> Vec<Room> {
