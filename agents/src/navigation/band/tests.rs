@@ -1,3 +1,5 @@
+//! The elastic band: what it gains, what it never gives up.
+
 use super::*;
 use nalgebra::Isometry2;
 use proptest::prelude::*;

@@ -1,3 +1,5 @@
+//! Navigation on the graph: steps are carried out, resumed and reported.
+
 use super::*;
 use crate::grid::{BLOCKED, CostGrid};
 use crate::navigation::control::{Motion, Unicycle};

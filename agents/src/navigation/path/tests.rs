@@ -1,3 +1,5 @@
+//! Paths on the grid: costs as documented, and never through what is blocked.
+
 use super::*;
 use crate::grid::FREE;
 use proptest::prelude::*;
