@@ -6,7 +6,7 @@
 
 use crate::scenario::{Invalid, Problem, ProblemKind, TracksFrame};
 use crate::world::{Body, wrap};
-use nalgebra::{Isometry2, Point2, Vector2};
+use nalgebra::{Point2, Rotation2, Vector2};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -134,13 +134,23 @@ impl Tracks {
         })
     }
 
-    /// The same people in a scenario's world.
-    pub(crate) fn placed(mut self, frame: &TracksFrame) -> Self {
-        let Isometry2 { rotation, .. } = frame.world_from_recording;
+    /// The same people in a world with these bounds.
+    pub(crate) fn placed(mut self, frame: &TracksFrame, bounds: [f64; 4]) -> Self {
+        let turn = Rotation2::new(frame.rotation);
+        let mut least = Vector2::repeat(f64::INFINITY);
+        let mut most = Vector2::repeat(f64::NEG_INFINITY);
         for sample in self.people.iter_mut().flat_map(|track| &mut track.samples) {
-            sample.position = frame.world_from_recording * sample.position;
-            sample.velocity = rotation * sample.velocity;
-            sample.heading = wrap(sample.heading + rotation.angle());
+            sample.position = turn * sample.position;
+            sample.velocity = turn * sample.velocity;
+            sample.heading = wrap(sample.heading + frame.rotation);
+            least = least.inf(&sample.position.coords);
+            most = most.sup(&sample.position.coords);
+        }
+        let [left, bottom, right, top] = bounds;
+        let middle = Vector2::new(left + right, bottom + top) / 2.0;
+        let translation = frame.translation.unwrap_or(middle - (least + most) / 2.0);
+        for sample in self.people.iter_mut().flat_map(|track| &mut track.samples) {
+            sample.position += translation;
         }
         self.offset += frame.offset;
         self
@@ -406,11 +416,12 @@ mod tests {
     #[test]
     fn a_scenario_turns_moves_and_skips() {
         let tracks = Tracks::parse("obsmat.txt", &walking_obsmat()).expect("good lines");
-        let pose = Isometry2::new(Vector2::new(10.0, 0.0), std::f64::consts::PI / 2.0);
-        let placed = tracks.placed(&TracksFrame {
-            world_from_recording: pose,
+        let frame = TracksFrame {
+            translation: Some(Vector2::new(10.0, 0.0)),
+            rotation: std::f64::consts::PI / 2.0,
             offset: 1.0,
-        });
+        };
+        let placed = tracks.placed(&frame, [0.0; 4]);
         let person = &placed.people_at(0.0)[0];
         assert!(
             (person.position - Point2::new(8.8, 2.5)).norm() < 1e-9,
@@ -419,6 +430,15 @@ mod tests {
         );
         assert!((person.velocity - Vector2::new(-1.2, 0.0)).norm() < 1e-9);
         assert!((wrap(person.heading - std::f64::consts::PI)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_recording_without_a_stated_place_comes_to_the_middle() {
+        let tracks =
+            Tracks::parse("plain.txt", "0 1 -90 4\n10 1 -89 4\n0 2 -90 8\n").expect("good");
+        let placed = tracks.placed(&TracksFrame::default(), [0.0, 0.0, 10.0, 20.0]);
+        let positions: Vec<_> = placed.people_at(0.0).iter().map(|p| p.position).collect();
+        assert_eq!(positions, [Point2::new(4.5, 8.0), Point2::new(4.5, 12.0)]);
     }
 
     #[test]

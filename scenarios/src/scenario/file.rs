@@ -293,12 +293,11 @@ fn tracks(scenario: &Table<'_>) -> TracksFrame {
     let Some(table) = scenario.table("tracks") else {
         return TracksFrame::default();
     };
-    let [x, y] = table
-        .get("translation")
-        .map_or([0.0; 2], |translation| translation.value);
-    let rotation = table.number("rotation", Bound::Any, 0.0);
     let tracks = TracksFrame {
-        world_from_recording: Isometry2::new(Vector2::new(x, y), rotation),
+        translation: table
+            .get::<[f64; 2]>("translation")
+            .map(|at| at.value.into()),
+        rotation: table.number("rotation", Bound::Any, 0.0),
         offset: table.number("offset", Bound::NotNegative, 0.0),
     };
     table.close();
