@@ -176,10 +176,21 @@ fn whole(table: &Table<'_>, text: &str, read: Read<'_>) -> Scenario {
     let objects = space::objects(table, &mut names, &rooms);
     let cameras = devices::cameras(table, &mut names);
     let robot = devices::robot(table, &mut names);
-    space::check_robot(table, &robot, &rooms, &walls, &objects);
+    let body = (robot.pose.translation.vector.into(), robot.radius);
+    let span = table.span_of("robot");
+    space::check_body(
+        table,
+        &rooms,
+        &walls,
+        objects.iter(),
+        body,
+        "the robot",
+        span,
+    );
     let scene = people::Scene {
         day: begin.date(),
         rooms: &rooms,
+        walls: &walls,
         places: &places,
         objects: &objects,
     };
