@@ -118,7 +118,6 @@ fn show(source: &mut Source, what: Option<&str>, as_json: bool) -> Result<Answer
         }
         Ok(())
     };
-    let mut read = read;
     read().map_err(Failure::internal)?;
     print(&text)
 }

@@ -5,6 +5,8 @@ mod graph;
 mod run;
 mod store;
 
+pub(crate) use agent::AGENTS;
+
 use crate::cli::Verb;
 use crate::{Answer, Failure};
 use dsr::{Instance, Schema};
@@ -41,7 +43,7 @@ fn load_grammar(text: &str, path: &Path) -> Result<Grammar, Failure> {
     };
     let (grammar, diagnostics) = grammar::load_grammar(text, &name, &mut include);
     if grammar::has_errors(&diagnostics) {
-        return Err(Failure::Input(grammar::Defects::new(diagnostics).into()));
+        return Err(Failure::Input(grammar::Defects { diagnostics }.into()));
     }
     Ok(grammar)
 }
@@ -49,7 +51,8 @@ fn load_grammar(text: &str, path: &Path) -> Result<Grammar, Failure> {
 /// The scenario's schema and grammar.
 fn load_rules(scenario: &Scenario) -> Result<(Schema, Grammar), Failure> {
     let grammar = load_grammar(&scenario.rules, &scenario.folder.join("rules.aggl"))?;
-    Ok((scenarios::schema(), grammar))
+    let schema = scenarios::schema().map_err(|error| Failure::Internal(error.into()))?;
+    Ok((schema, grammar))
 }
 
 /// A flag that the first Ctrl-C or termination request sets; the second ends the program at once.

@@ -1,3 +1,5 @@
+//! Scenario files: what a good one says, and where each mistake is underlined.
+
 #![allow(clippy::float_cmp, reason = "what a file says is read to the bit")]
 #![allow(clippy::too_many_lines, reason = "a report is read in one piece")]
 
