@@ -3,3 +3,4 @@
 
 pub mod grid;
 pub mod messages;
+pub mod social_mapping;

@@ -11,7 +11,13 @@ mod arena;
 mod change;
 mod graph;
 mod ids;
+mod process;
 mod schema;
+#[allow(
+    unsafe_code,
+    reason = "the one module that maps memory of other processes"
+)]
+mod shm;
 mod snapshot;
 mod time;
 mod transaction;
@@ -19,10 +25,15 @@ mod value;
 
 pub use arena::ReadError;
 pub use change::{Change, EdgeChange, Filter, NodeChange, RuleApplication, Touch};
-pub use graph::{Graph, Limits, RuleEngine};
+pub use graph::{Graph, Image, Limits, RuleEngine};
 pub use ids::{AttributeId, EdgeKey, Epoch, LabelId, NodeId, TypeId, Version, WriterId};
+pub use process::{Pace, TurnError, Turns, done_line, turn_line};
 pub use schema::{
     AttributeType, Label, NameKind, NodeType, Schema, SchemaError, SchemaFileError, suggest,
+};
+pub use shm::{
+    AttachError, Changes, ClockError, CommitError, Instance, InstanceError, Publisher, Session,
+    Store, StoreError, Subscriber, Tick, Update,
 };
 pub use snapshot::{Attribute, Edge, Node, Snapshot};
 pub use time::Time;

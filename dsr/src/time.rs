@@ -44,7 +44,7 @@ impl Time {
 impl Add<f64> for Time {
     type Output = Self;
     fn add(self, seconds: f64) -> Self {
-        Self(self.0.saturating_add((seconds * 1e9).round() as i64))
+        Self(self.0.saturating_add(Self::from_seconds(seconds).0))
     }
 }
 

@@ -1,2 +1,14 @@
-//! TODO-DOC
+//! Everything around a run that is not an agent: the scenario folder and its diagnostics, the
+//! world simulator that moves robot and people and makes sensor readings, recorded pedestrians.
+//!
+//! Nothing here reads a clock or starts a process: a scenario is data, and the world is a function
+//! of scenario, seed and inputs.
 #![forbid(unsafe_code)]
+
+pub mod scenario;
+pub mod tracks;
+pub mod world;
+
+pub use scenario::{LoadError, Scenario};
+pub use tracks::{Tracks, TracksError};
+pub use world::{Inputs, Outputs, Truth, World};

@@ -21,7 +21,7 @@ use thiserror::Error;
 /// A word of the arena.
 #[derive(Debug, Default)]
 #[repr(transparent)]
-pub struct Word(AtomicU64);
+pub(crate) struct Word(AtomicU64);
 
 impl Word {
     pub(crate) fn load(&self) -> u64 {

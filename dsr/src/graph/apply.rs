@@ -3,6 +3,7 @@
 //! working root.
 
 use super::Graph;
+use super::image::{AttributeImage, Image};
 use crate::arena::allocator::Full;
 use crate::arena::record::{self, AttributeRecord, EdgeRecord, NodeRecord, row, split_row};
 use crate::arena::{Address, Root, tree, trie};
@@ -24,11 +25,19 @@ impl From<SchemaError> for Refusal {
 /// What a commit has touched so far.
 type Touched<K, V> = BTreeMap<K, (V, Touch, Vec<AttributeId>)>;
 
+/// What a written attribute remembers.
+#[derive(Debug, Clone, Copy)]
+struct Stamp {
+    version: u64,
+    time: i64,
+    writer: u16,
+}
+
 pub(super) struct Work<'a> {
     graph: &'a mut Graph,
     root: Root,
     agent: String,
-    writer: u16,
+    stamp: Stamp,
     schema_changed: bool,
     nodes: Touched<NodeId, TypeId>,
     edges: Touched<EdgeKey, ()>,
@@ -77,13 +86,64 @@ impl<'a> Work<'a> {
             graph,
             root,
             agent: agent.to_owned(),
-            writer,
+            stamp: Stamp {
+                version: root.version,
+                time: root.time,
+                writer,
+            },
             schema_changed: false,
             nodes: BTreeMap::new(),
             edges: BTreeMap::new(),
             created: Vec::new(),
             rules: Vec::new(),
         })
+    }
+
+    /// The root of a graph that is what the image says.
+    pub(super) fn restore(graph: &'a mut Graph, image: &Image) -> Result<Root, Refusal> {
+        let (nodes, edges, writers) = image.parts();
+        let (version, time, next_id) = image.stamp();
+        let mut work = Self::new(graph, "store", time)?;
+        for node in nodes {
+            let type_name = work.schema().type_name(node.type_id).to_owned();
+            work.create_node(Some(node.id), &type_name, &node.name, &[])?;
+            work.restore_attributes(&Owner::Node(node.id.into()), &node.attributes)?;
+        }
+        for edge in edges {
+            let label = work.schema().label_name(edge.key.label).to_owned();
+            let key = EdgeRef {
+                from: edge.key.from.into(),
+                label,
+                to: edge.key.to.into(),
+            };
+            work.create_edge(&key, &[])?;
+            work.restore_attributes(&Owner::Edge(key), &edge.attributes)?;
+        }
+        let schema = work.graph.write_schema(&mut work.root);
+        work.room(schema)?;
+        let writers = work.graph.write_writers(writers.to_vec(), &mut work.root);
+        work.room(writers)?;
+        work.root.version = version.0;
+        work.root.time = time.nanoseconds();
+        work.root.next_id = next_id.max(work.root.next_id);
+        Ok(work.root)
+    }
+
+    fn restore_attributes(
+        &mut self,
+        owner: &Owner,
+        rows: &[AttributeImage],
+    ) -> Result<(), Refusal> {
+        for row in rows {
+            self.stamp = Stamp {
+                version: row.version,
+                time: row.time,
+                writer: row.writer,
+            };
+            let name = self.schema().attribute_name(row.name).to_owned();
+            self.change_attribute(owner, &name, Some(&row.value))?;
+        }
+        Ok(())
     }
 
     fn snapshot(&self) -> Snapshot {
@@ -96,11 +156,6 @@ impl<'a> Work<'a> {
 
     fn room<T>(&self, outcome: Result<T, Full>) -> Result<T, Refusal> {
         outcome.map_err(|Full| self.graph.full())
-    }
-
-    /// The writer reads its own memory: an impossible place there is a damaged arena.
-    fn read<T>(&self, outcome: Result<T, Address>) -> Result<T, Refusal> {
-        outcome.map_err(|address| damaged(ReadError::Damaged { address }))
     }
 
     pub(super) fn require(&self, preconditions: &[Precondition]) -> Result<(), Refusal> {
@@ -150,7 +205,7 @@ impl<'a> Work<'a> {
             .map(|&r| split_row(r))
             .find(|(a, _)| *a == attribute.0);
         address
-            .map(|(_, at)| self.read(AttributeRecord::read(&self.graph.writer.arena, at)))
+            .map(|(_, at)| read(AttributeRecord::read(&self.graph.writer.arena, at)))
             .transpose()
             .map(|found| found.map(|record| record.value))
     }
@@ -282,10 +337,9 @@ impl<'a> Work<'a> {
                 .ok_or_else(|| Refusal::NotFound(node.to_string()))?,
         };
         let arena = &self.graph.writer.arena;
-        let address = self
-            .read(trie::find(arena, self.root.nodes, id.0))?
+        let address = read(trie::find(arena, self.root.nodes, id.0))?
             .ok_or_else(|| Refusal::NotFound(node.to_string()))?;
-        Ok((address, self.read(NodeRecord::read(arena, address))?))
+        Ok((address, read(NodeRecord::read(arena, address))?))
     }
 
     fn put_node(
@@ -331,7 +385,7 @@ impl<'a> Work<'a> {
             id: id.0,
             type_id: type_id.0,
             name: 0,
-            version: self.root.version,
+            version: self.stamp.version,
             out: 0,
             into: 0,
             rows: Vec::new(),
@@ -372,7 +426,7 @@ impl<'a> Work<'a> {
         member: bool,
     ) -> Result<Address, Refusal> {
         let entry = record::directory_entry(&self.graph.writer.arena, directory, id);
-        let (members, count) = self.read(entry)?;
+        let (members, count) = read(entry)?;
         let writer = &mut self.graph.writer;
         let entry = if member {
             tree::insert(writer, members, key, 0).map(|root| (root, count + 1))
@@ -403,7 +457,7 @@ impl<'a> Work<'a> {
         for &row in &node.rows {
             self.retire_attribute(split_row(row).1);
         }
-        let name = self.read(record::read_blob(&self.graph.writer.arena, node.name))?;
+        let name = read(record::read_blob(&self.graph.writer.arena, node.name))?;
         let hash = name_hash(&String::from_utf8_lossy(&name));
         let writer = &mut self.graph.writer;
         let words = record::blob_len(writer.arena(), node.name);
@@ -433,7 +487,7 @@ impl<'a> Work<'a> {
         self.index_type(type_id, id, true)?;
         let len = node.words().len();
         node.type_id = type_id.0;
-        node.version = self.root.version;
+        node.version = self.stamp.version;
         self.put_node(Some((address, len)), &node)?;
         touch(&mut self.nodes, id, type_id, Touch::Updated, None);
         Ok(())
@@ -454,16 +508,14 @@ impl<'a> Work<'a> {
         };
         let out = self.node(&from.into())?.1.out;
         let found = tree::find(&self.graph.writer.arena, out, [u64::from(label.0), to.0]);
-        Ok(self
-            .read(found)?
-            .map(|address| (EdgeKey { from, label, to }, address)))
+        Ok(read(found)?.map(|address| (EdgeKey { from, label, to }, address)))
     }
 
     fn edge(&self, edge: &EdgeRef) -> Result<(EdgeKey, Address, EdgeRecord), Refusal> {
         let (key, address) = self
             .find_edge(edge)?
             .ok_or_else(|| Refusal::NotFound(format!("edge {edge}")))?;
-        let record = self.read(EdgeRecord::read(&self.graph.writer.arena, address))?;
+        let record = read(EdgeRecord::read(&self.graph.writer.arena, address))?;
         Ok((key, address, record))
     }
 
@@ -484,7 +536,7 @@ impl<'a> Work<'a> {
         };
         let existing = self.find_edge(edge)?;
         let mut record = match existing {
-            Some((_, address)) => self.read(EdgeRecord::read(&self.graph.writer.arena, address))?,
+            Some((_, address)) => read(EdgeRecord::read(&self.graph.writer.arena, address))?,
             None => EdgeRecord {
                 from: from.id,
                 to: to.id,
@@ -494,7 +546,7 @@ impl<'a> Work<'a> {
             },
         };
         let len = record.words().len();
-        record.version = self.root.version;
+        record.version = self.stamp.version;
         let how = if existing.is_some() {
             Touch::Updated
         } else {
@@ -548,8 +600,8 @@ impl<'a> Work<'a> {
         let label = u64::from(key.label.0);
         let (address, mut from) = self.node(&key.from.into())?;
         let found = tree::find(&self.graph.writer.arena, from.out, [label, key.to.0]);
-        if let Some(edge) = self.read(found)? {
-            let record = self.read(EdgeRecord::read(&self.graph.writer.arena, edge))?;
+        if let Some(edge) = read(found)? {
+            let record = read(EdgeRecord::read(&self.graph.writer.arena, edge))?;
             for &row in &record.rows {
                 self.retire_attribute(split_row(row).1);
             }
@@ -589,9 +641,9 @@ impl<'a> Work<'a> {
         self.schema().check_value(attribute, value)?;
         let record = AttributeRecord {
             value: value.clone(),
-            version: self.root.version,
-            time: self.root.time,
-            writer: self.writer,
+            version: self.stamp.version,
+            time: self.stamp.time,
+            writer: self.stamp.writer,
         };
         let address = self.graph.writer.write(&record.words());
         let address = self.room(address)?;
@@ -617,7 +669,7 @@ impl<'a> Work<'a> {
                 let (address, mut record) = self.node(node)?;
                 let len = record.words().len();
                 let name = self.change_row(&mut record.rows, name, value)?;
-                record.version = self.root.version;
+                record.version = self.stamp.version;
                 self.put_node(Some((address, len)), &record)?;
                 let type_id = TypeId(record.type_id);
                 touch(
@@ -632,7 +684,7 @@ impl<'a> Work<'a> {
                 let (key, address, mut record) = self.edge(edge)?;
                 let len = record.words().len();
                 let name = self.change_row(&mut record.rows, name, value)?;
-                record.version = self.root.version;
+                record.version = self.stamp.version;
                 self.put_edge(key, Some((address, len)), &record)?;
                 touch(&mut self.edges, key, (), Touch::Updated, Some(name));
             }
@@ -689,6 +741,11 @@ impl<'a> Work<'a> {
         };
         Ok((self.root, self.created, change))
     }
+}
+
+/// The writer reads its own memory: an impossible place there is a damaged arena.
+fn read<T>(outcome: Result<T, Address>) -> Result<T, Refusal> {
+    outcome.map_err(|address| damaged(ReadError::Damaged { address }))
 }
 
 fn damaged(error: ReadError) -> Refusal {

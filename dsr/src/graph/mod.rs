@@ -3,9 +3,12 @@
 //! around it, and so is everything that works on a file.
 
 mod apply;
+mod image;
+
+pub use image::Image;
 
 use crate::arena::allocator::{Allocator, Full, Growth, HeapGrowth};
-use crate::arena::{Address, Arena, Root, Word, record};
+use crate::arena::{Address, Arena, Root, record};
 use crate::{
     Change, Commit, Epoch, NodeId, Operation, Refusal, Schema, Snapshot, Time, Transaction, Version,
 };
@@ -188,10 +191,6 @@ impl Graph {
         }
     }
 
-    pub(crate) fn arena(&self) -> &Arc<Arena> {
-        &self.writer.arena
-    }
-
     /// This life of the store.
     pub fn epoch(&self) -> Epoch {
         self.epoch
@@ -212,7 +211,7 @@ impl Graph {
         agent: &str,
         time: Time,
     ) -> Result<(Commit, Change), Refusal> {
-        let before = (Arc::clone(&self.schema), self.writers.len());
+        let before = (Arc::clone(&self.schema), self.writers.clone());
         let outcome = match self.try_commit(transaction, agent, time) {
             Err(Refusal::OutOfMemory { .. }) => {
                 // History gives way before a commit is refused.
@@ -254,10 +253,10 @@ impl Graph {
         work.finish()
     }
 
-    fn abandon(&mut self, before: &(Arc<Schema>, usize)) {
+    fn abandon(&mut self, before: &(Arc<Schema>, Vec<String>)) {
         self.writer.allocator.abandoned();
         self.schema = Arc::clone(&before.0);
-        self.writers.truncate(before.1);
+        self.writers.clone_from(&before.1);
     }
 
     fn publish(&mut self, root: Root) {
@@ -298,23 +297,22 @@ impl Graph {
             return Ok(index as u16);
         }
         let index = u16::try_from(self.writers.len()).map_err(|_| Full)?;
-        self.writers.push(agent.to_owned());
-        let bytes = postcard::to_stdvec(&self.writers).unwrap_or_default();
+        let mut writers = self.writers.clone();
+        writers.push(agent.to_owned());
+        self.write_writers(writers, root)?;
+        Ok(index)
+    }
+
+    fn write_writers(&mut self, writers: Vec<String>, root: &mut Root) -> Result<(), Full> {
+        let bytes = postcard::to_stdvec(&writers).unwrap_or_default();
+        self.writers = writers;
         let old = root.writers;
         root.writers = record::write_blob(&mut self.writer, &bytes)?;
         if old != 0 {
             let words = record::blob_len(&self.writer.arena, old);
             self.writer.retire(old, words);
         }
-        Ok(index)
-    }
-}
-
-impl Word {
-    /// Whether the word is zero; what a fresh segment is full of.
-    #[cfg(test)]
-    pub(crate) fn is_zero(&self) -> bool {
-        self.load() == 0
+        Ok(())
     }
 }
 

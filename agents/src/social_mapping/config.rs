@@ -1,0 +1,150 @@
+//! The figures of the social map. This file owns their defaults, and guarantees that figures which
+//! pass [`SocialConfig::problems`] make a map of every sound scene.
+
+use super::object_space::{Space, UsageCurve};
+use super::zones::Proxemics;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// All figures of the social map; every one has the papers' or our documented default.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SocialConfig {
+    /// Side of a cell, metres.
+    pub resolution: f64,
+    /// People's density and zones. Preset `hall` with levels .9/.5/.1.
+    pub proxemics: Proxemics,
+    /// Whether the space of walking people reaches further ahead on the grid, by
+    /// [`AsymmetricGaussian::walking`](super::AsymmetricGaussian::walking). Polylines and metrics keep the standing shape.
+    pub stretch: bool,
+    /// What a place right beside an obstacle costs more than a free one. The default stays below
+    /// the cheapest space of an object, so the order of READING.md item 7 holds; 0 turns it off.
+    pub clearance_cost: f64,
+    /// Over which distance from the blocked cells that falls to nothing, metres.
+    pub clearance_width: f64,
+    /// Half the width of the space between two who interact, metres. It costs as much as personal
+    /// space: a robot passes between two who talk only where there is no other way.
+    pub between_half_width: f64,
+    /// Two who interact from further than this leave no space between them, metres (the outer end
+    /// of Hall's social distance).
+    pub between_reach: f64,
+    /// The space of each class of objects; a class not named has none.
+    pub spaces: BTreeMap<String, Space>,
+    /// R(t).
+    pub usage: UsageCurve,
+    /// R(t) of single objects, by name.
+    pub usage_of: BTreeMap<String, UsageCurve>,
+    /// Points of a person's polylines.
+    pub contour_points: usize,
+}
+
+impl Default for SocialConfig {
+    fn default() -> Self {
+        let viewed = ["tv", "board"].map(|class| (class.to_owned(), Space::VIEWED));
+        let around = ["table", "bed", "stretcher"].map(|c| (c.to_owned(), Space::USED_AROUND));
+        Self {
+            resolution: 0.1,
+            proxemics: Proxemics::default(),
+            stretch: true,
+            clearance_cost: 0.4,
+            clearance_width: 0.3,
+            between_half_width: 0.5,
+            between_reach: 3.6,
+            spaces: viewed.into_iter().chain(around).collect(),
+            usage: UsageCurve::default(),
+            usage_of: BTreeMap::new(),
+            contour_points: 24,
+        }
+    }
+}
+
+/// A configuration that makes no map.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("social mapping: {field} {requirement}")]
+pub struct ConfigError {
+    /// The field at fault.
+    pub field: String,
+    /// What it has to be.
+    pub requirement: &'static str,
+}
+
+impl SocialConfig {
+    /// Everything that is wrong with the figures.
+    pub fn problems(&self) -> Vec<ConfigError> {
+        let not_negative = |x: f64| x.is_finite() && x >= 0.0;
+        let length = "must be a finite length, not negative";
+        let curve = "needs 1 <= least <= most, a ramp longer than 0 s and steps larger than 0";
+        let mut checks = vec![
+            (
+                "resolution".to_owned(),
+                self.resolution.is_finite() && self.resolution > 0.0,
+                "must be a finite length greater than 0",
+            ),
+            (
+                "proxemics.shape".to_owned(),
+                self.proxemics.shape.is_valid(),
+                "needs three finite widths greater than 0",
+            ),
+            (
+                "proxemics.levels".to_owned(),
+                self.proxemics.levels.is_valid(),
+                "must satisfy 0 < social < personal < intimate < 1",
+            ),
+            (
+                "clearance_cost".to_owned(),
+                not_negative(self.clearance_cost),
+                "must be finite and not negative",
+            ),
+            (
+                "clearance_width".to_owned(),
+                not_negative(self.clearance_width),
+                length,
+            ),
+            (
+                "between_half_width".to_owned(),
+                not_negative(self.between_half_width),
+                length,
+            ),
+            (
+                "between_reach".to_owned(),
+                not_negative(self.between_reach),
+                length,
+            ),
+            ("usage".to_owned(), self.usage.is_valid(), curve),
+        ];
+        checks.extend(
+            self.usage_of
+                .iter()
+                .map(|(o, c)| (format!("usage_of.{o}"), c.is_valid(), curve)),
+        );
+        checks.extend(self.spaces.iter().map(|(class, space)| {
+            let requirement = "needs finite lengths greater than 0 and an opening below pi";
+            (format!("spaces.{class}"), space.is_valid(), requirement)
+        }));
+        checks
+            .into_iter()
+            .filter(|(_, sound, _)| !sound)
+            .map(|(field, _, requirement)| ConfigError { field, requirement })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::social_mapping::map::SocialMapper;
+
+    #[test]
+    fn figures_that_make_no_map_are_all_named() {
+        let mut config = SocialConfig {
+            resolution: 0.0,
+            ..SocialConfig::default()
+        };
+        config.proxemics.levels.personal = 0.95;
+        config.spaces.insert("bath".into(), Space::Margin(f64::NAN));
+        let problems = config.problems();
+        let fields: Vec<_> = problems.iter().map(|p| p.field.as_str()).collect();
+        assert_eq!(fields, ["resolution", "proxemics.levels", "spaces.bath"]);
+        assert_eq!(SocialMapper::new(config).unwrap_err(), problems);
+    }
+}

@@ -1,0 +1,244 @@
+//! Kirby's asymmetric Gaussian: how much a place belongs to a person (TD eq. 1 to 4, READING.md
+//! items 1 and 2). This file owns the curve and its contours; both are exact, in the person's own
+//! frame, so the surface is continuous everywhere.
+
+use nalgebra::{Isometry2, Point2};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// How long a walking person's way ahead counts as theirs, seconds. With the `hall` widths a runner
+/// (2 m/s) gets the front width 2.0 m that AP prints for running.
+pub const LOOK_AHEAD: f64 = 0.5;
+/// Speeds above this stretch a space no further, m/s: faster "people" are tracking errors.
+pub const FASTEST: f64 = 2.0;
+
+/// The standard deviations of a person's space to the front, the sides and the rear, metres.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AsymmetricGaussian {
+    /// Along the heading.
+    pub front: f64,
+    /// To either side.
+    pub side: f64,
+    /// Against the heading.
+    pub rear: f64,
+}
+
+impl AsymmetricGaussian {
+    /// The widths with which Hall's distances come out: level 0.9 lies 0.46 m ahead and 0.5 lies
+    /// 1.18 m ahead (READING.md item 2).
+    pub const HALL: Self = Self {
+        front: 1.0,
+        side: 0.75,
+        rear: 0.5,
+    };
+    /// The widths as paper TD prints them.
+    pub const PRINTED: Self = Self {
+        front: 2.0,
+        side: 4.0 / 3.0,
+        rear: 1.0,
+    };
+
+    /// The preset of that name: `hall` or `printed`.
+    pub fn find_preset(name: &str) -> Option<Self> {
+        match name {
+            "hall" => Some(Self::HALL),
+            "printed" => Some(Self::PRINTED),
+            _ => None,
+        }
+    }
+
+    /// Whether all three widths are positive and finite.
+    pub fn is_valid(&self) -> bool {
+        [self.front, self.side, self.rear]
+            .iter()
+            .all(|s| s.is_finite() && *s > 0.0)
+    }
+
+    /// The squared distance of a place from the person in units of the standard deviations;
+    /// `place` is in the person's own frame (x ahead, y left), metres.
+    pub fn squared_deviation(&self, place: Point2<f64>) -> f64 {
+        let along = if place.x >= 0.0 {
+            self.front
+        } else {
+            self.rear
+        };
+        (place.x / along).powi(2) + (place.y / self.side).powi(2)
+    }
+
+    /// The density at `point` (world frame) of a person at `world_from_person`: 1 at the person,
+    /// falling to 0. Equals Kirby's rotated form with its factor 2 (READING.md item 1).
+    pub fn density(&self, world_from_person: &Isometry2<f64>, point: Point2<f64>) -> f64 {
+        let place = world_from_person.inverse_transform_point(&point);
+        (-0.5 * self.squared_deviation(place)).exp()
+    }
+
+    /// How far from the person the density falls to `level`, metres, in `direction` (radians
+    /// counter-clockwise from the heading). `None` where `level` is not in (0, 1).
+    pub fn distance_at(&self, direction: f64, level: f64) -> Option<f64> {
+        let deviations = deviations_at(level)?;
+        let (sin, cos) = direction.sin_cos();
+        let along = if cos >= 0.0 { self.front } else { self.rear };
+        Some(deviations / (cos / along).hypot(sin / self.side))
+    }
+
+    /// The contour at `level`: half an ellipse ahead and half another behind, world frame,
+    /// counter-clockwise from the right-hand side, closed (the first point is not repeated).
+    ///
+    /// `points` is rounded up to a multiple of four, so that the extremes on the axes are among
+    /// them. Empty where `level` is not in (0, 1).
+    pub fn contour(
+        &self,
+        world_from_person: &Isometry2<f64>,
+        level: f64,
+        points: usize,
+    ) -> Vec<Point2<f64>> {
+        let Some(deviations) = deviations_at(level) else {
+            return Vec::new();
+        };
+        let half = (points.max(4).div_ceil(4)) * 2;
+        (0..2 * half)
+            .map(|i| {
+                let (sin, cos) = (-FRAC_PI_2 + PI * i as f64 / half as f64).sin_cos();
+                let along = if i <= half { self.front } else { self.rear };
+                world_from_person
+                    * Point2::new(deviations * along * cos, deviations * self.side * sin)
+            })
+            .collect()
+    }
+
+    /// The space of a person who walks with `forward_speed` along the heading, m/s: the front
+    /// grows by [`LOOK_AHEAD`] times the speed. AP updates the front width with the velocity and
+    /// prints no law; this one meets its figure for running. Who walks backwards keeps their space.
+    #[must_use]
+    pub fn walking(&self, forward_speed: f64) -> Self {
+        let stretch = LOOK_AHEAD * forward_speed.clamp(0.0, FASTEST);
+        Self {
+            front: self.front + stretch,
+            ..*self
+        }
+    }
+}
+
+impl Default for AsymmetricGaussian {
+    fn default() -> Self {
+        Self::HALL
+    }
+}
+
+/// How many standard deviations from the person the density is `level`.
+fn deviations_at(level: f64) -> Option<f64> {
+    (level > 0.0 && level < 1.0).then(|| squared_deviation_at(level).sqrt())
+}
+
+/// The squared deviation at which the density is `level`.
+pub(super) fn squared_deviation_at(level: f64) -> f64 {
+    -2.0 * level.ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector2;
+    use proptest::prelude::*;
+
+    fn pose() -> impl Strategy<Value = Isometry2<f64>> {
+        (-20.0..20.0, -20.0..20.0, -4.0..4.0)
+            .prop_map(|(x, y, heading)| Isometry2::new(Vector2::new(x, y), heading))
+    }
+
+    fn shape() -> impl Strategy<Value = AsymmetricGaussian> {
+        (0.2..3.0, 0.2..3.0, 0.2..3.0).prop_map(|(front, side, rear)| AsymmetricGaussian {
+            front,
+            side,
+            rear,
+        })
+    }
+
+    /// Kirby's rotated form, as READING.md item 1 gives it.
+    fn kirby(g: &AsymmetricGaussian, pose: &Isometry2<f64>, point: Point2<f64>) -> f64 {
+        let t = pose.rotation.angle();
+        let d = point - Point2::from(pose.translation.vector);
+        let ahead = t.cos() * d.x + t.sin() * d.y >= 0.0;
+        let s2 = if ahead { g.front } else { g.rear }.powi(2);
+        let ss2 = g.side.powi(2);
+        let a = t.cos().powi(2) / (2.0 * s2) + t.sin().powi(2) / (2.0 * ss2);
+        let b = (2.0 * t).sin() / (4.0 * s2) - (2.0 * t).sin() / (4.0 * ss2);
+        let c = t.sin().powi(2) / (2.0 * s2) + t.cos().powi(2) / (2.0 * ss2);
+        (-(a * d.x * d.x + 2.0 * b * d.x * d.y + c * d.y * d.y)).exp()
+    }
+
+    #[test]
+    fn a_runner_has_the_front_that_ap_prints() {
+        let runner = AsymmetricGaussian::HALL.walking(2.0);
+        assert!((runner.front - 2.0).abs() < 1e-12);
+        assert_eq!(
+            AsymmetricGaussian::HALL.walking(-1.0),
+            AsymmetricGaussian::HALL
+        );
+        assert_eq!(AsymmetricGaussian::HALL.walking(40.0), runner);
+    }
+
+    #[test]
+    fn levels_outside_the_unit_interval_have_no_contour() {
+        let hall = AsymmetricGaussian::HALL;
+        for level in [0.0, 1.0, -0.5, 2.0, f64::NAN] {
+            assert_eq!(hall.distance_at(0.0, level), None);
+            assert!(hall.contour(&Isometry2::identity(), level, 24).is_empty());
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn density_is_kirbys_and_within_the_unit_interval(
+            g in shape(), pose in pose(), x in -25.0..25.0f64, y in -25.0..25.0f64,
+        ) {
+            let point = Point2::new(x, y);
+            let density = g.density(&pose, point);
+            prop_assert!((0.0..=1.0).contains(&density));
+            // On the lateral axis rounding may put the two forms on different halves.
+            prop_assert!((density - kirby(&g, &pose, point)).abs() < 1e-9);
+            let own = g.density(&pose, Point2::from(pose.translation.vector));
+            prop_assert!((own - 1.0).abs() < 1e-12);
+        }
+
+        #[test]
+        fn density_is_continuous_across_the_lateral_axis(
+            g in shape(), pose in pose(), y in -5.0..5.0f64,
+        ) {
+            let ahead = g.density(&pose, pose * Point2::new(1e-7, y));
+            let behind = g.density(&pose, pose * Point2::new(-1e-7, y));
+            prop_assert!((ahead - behind).abs() < 1e-9);
+        }
+
+        #[test]
+        fn contour_points_lie_on_their_level(
+            g in shape(), pose in pose(), level in 0.02..0.98f64, points in 1usize..80,
+        ) {
+            let contour = g.contour(&pose, level, points);
+            prop_assert!(contour.len() >= points && contour.len().is_multiple_of(4));
+            for point in contour {
+                prop_assert!((g.density(&pose, point) - level).abs() < 1e-9);
+            }
+        }
+
+        #[test]
+        fn distance_along_a_direction_meets_the_level(
+            g in shape(), pose in pose(), level in 0.02..0.98f64, direction in -7.0..7.0f64,
+        ) {
+            let distance = g.distance_at(direction, level).unwrap();
+            let point = pose * Point2::new(distance * direction.cos(), distance * direction.sin());
+            prop_assert!((g.density(&pose, point) - level).abs() < 1e-9);
+        }
+
+        #[test]
+        fn density_moves_and_turns_with_the_person(
+            g in shape(), pose in pose(), motion in pose(),
+            x in -5.0..5.0f64, y in -5.0..5.0f64,
+        ) {
+            let point = Point2::new(x, y);
+            let moved = g.density(&(motion * pose), motion * point);
+            prop_assert!((g.density(&pose, point) - moved).abs() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,27 @@
+//! Social mapping: how near the robot may come to people and to what they use, as a function of
+//! place and time (paper TD sections 4 and 5; READING.md items 1, 2, 5, 6, 7, 9, 11).
+//!
+//! This module owns the models and the grid made of them. It guarantees that the grid is a pure
+//! function of the scene and the time: what is updated step by step equals, bit for bit, what a
+//! new mapper would draw, because layers are combined by the maximum and by nothing else.
+//!
+//! The layers, in AP's order: walls and the footprints of objects, inflated by the robot's radius;
+//! the spaces of objects with R(t); people with their zones; the space between people who talk.
+
+pub mod config;
+pub mod gaussian;
+pub mod graph;
+mod layers;
+pub mod map;
+pub mod object_space;
+pub mod scene;
+mod visibility;
+pub mod zones;
+
+pub use config::{ConfigError, SocialConfig};
+pub use gaussian::AsymmetricGaussian;
+pub use graph::{SocialMapping, Turn};
+pub use map::{ObjectUse, PersonSpaces, SocialMapper, Update};
+pub use object_space::{Agenda, Outline, Space, UsageCurve};
+pub use scene::{Rejection, SceneError, SocialScene};
+pub use zones::{Levels, Proxemics, Zone, zone_at};

@@ -1,0 +1,279 @@
+//! What social mapping is told, and what becomes of bad input. This file owns the rule: where the
+//! map itself would be wrong the scene is refused; where one item is bad, the item alone is left
+//! out or mended as its [`Rejection`] says, and always reported.
+
+use super::object_space::{Agenda, EndsBeforeStart, Outline};
+use dsr::Time;
+use nalgebra::{Isometry2, Point2, Vector2};
+
+/// A wall from one point to another, world frame, metres.
+pub type Wall = [Point2<f64>; 2];
+
+/// The radius taken for a person whose own is unusable, metres.
+pub const BODY_RADIUS: f64 = 0.25;
+
+/// Everything the social map depends on, beside the time. World frame, SI.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SocialScene {
+    /// What the grid covers: xmin, ymin, xmax, ymax.
+    pub bounds: [f64; 4],
+    /// The walls.
+    pub walls: Vec<Wall>,
+    /// Radius of the robot, for which the map is inflated.
+    pub robot_radius: f64,
+    /// Whether people have zones and objects have spaces; otherwise both are mere obstacles.
+    pub social: bool,
+    /// The people.
+    pub people: Vec<Person>,
+    /// Who talks with whom, by name.
+    pub interactions: Vec<(String, String)>,
+    /// The objects.
+    pub objects: Vec<Object>,
+    /// What is done with them when.
+    pub activities: Vec<Activity>,
+    /// What whoever made the scene had to leave out; the update passes it on.
+    pub rejected: Vec<Rejection>,
+}
+
+/// A person.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Person {
+    /// Unique among people.
+    pub name: String,
+    /// Where the person stands and faces.
+    pub world_from_person: Isometry2<f64>,
+    /// Velocity, world frame, m/s.
+    pub velocity: Vector2<f64>,
+    /// Radius of the body.
+    pub radius: f64,
+}
+
+/// An object.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Object {
+    /// Unique among objects.
+    pub name: String,
+    /// The name of its type, such as `table`: chooses its space.
+    pub class: String,
+    /// Where it stands and faces.
+    pub world_from_object: Isometry2<f64>,
+    /// What it covers.
+    pub outline: Outline,
+}
+
+/// Something scheduled with an object.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Activity {
+    /// The object's name.
+    pub object: String,
+    /// When it starts.
+    pub start: Time,
+    /// When it ends.
+    pub end: Time,
+}
+
+/// Why no map can be made of a scene.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SceneError {
+    /// The bounds are not finite or enclose nothing.
+    #[error("the map's bounds {bounds:?} enclose nothing; need xmin < xmax and ymin < ymax")]
+    Bounds {
+        /// As given.
+        bounds: [f64; 4],
+    },
+    /// The grid would be larger than [`MOST_CELLS`].
+    #[error(
+        "the map's bounds {bounds:?} at {resolution} m a cell need more than {MOST_CELLS} cells"
+    )]
+    TooLarge {
+        /// As given.
+        bounds: [f64; 4],
+        /// Side of a cell, metres.
+        resolution: f64,
+    },
+    /// A wall has an end that is no place: leaving it out would open the map.
+    #[error("wall {index} has an end that is not finite")]
+    Wall {
+        /// Its index in `walls`.
+        index: usize,
+    },
+    /// The robot's radius is not a length.
+    #[error("the robot's radius is {radius} m")]
+    RobotRadius {
+        /// As given.
+        radius: f64,
+    },
+}
+
+/// The largest grid that is made: 100 MB of costs.
+pub const MOST_CELLS: f64 = 25e6;
+
+/// An item that was left out of the map or mended.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Rejection {
+    /// The person is left out.
+    #[error("person {name} is ignored: the pose is not finite")]
+    PersonPose {
+        /// The person.
+        name: String,
+    },
+    /// The person counts as standing still.
+    #[error("person {name} is taken to stand still: the velocity is not finite")]
+    PersonVelocity {
+        /// The person.
+        name: String,
+    },
+    /// The person has the radius [`BODY_RADIUS`].
+    #[error("person {name} is given the usual radius: {radius} m is none")]
+    PersonRadius {
+        /// The person.
+        name: String,
+        /// As given.
+        radius: f64,
+    },
+    /// The object is left out.
+    #[error("object {name} is ignored: its pose or size is not finite")]
+    Object {
+        /// The object.
+        name: String,
+    },
+    /// The space between the two is left out.
+    #[error("{name} and {other} interact, but nobody called {missing} has a place")]
+    Interaction {
+        /// One of them.
+        name: String,
+        /// The other.
+        other: String,
+        /// Whom the map does not have.
+        missing: String,
+    },
+    /// The space between the two is left out: nobody talks across that distance.
+    #[error("{name} and {other} interact at {distance:.1} m: too far for a space between them")]
+    InteractionTooFar {
+        /// One of them.
+        name: String,
+        /// The other.
+        other: String,
+        /// Between them, metres.
+        distance: f64,
+    },
+    /// The activity is left out.
+    #[error("an activity with {object} is ignored: {error}")]
+    ActivityOrder {
+        /// The object.
+        object: String,
+        /// What is wrong.
+        error: EndsBeforeStart,
+    },
+    /// The activity is left out.
+    #[error("activity {activity} is ignored: its start or end is not a time")]
+    ActivityTime {
+        /// The activity.
+        activity: String,
+    },
+    /// The activity has no effect.
+    #[error("an activity uses {object}, which the map does not have or which has no space")]
+    ActivityObject {
+        /// The name given.
+        object: String,
+    },
+}
+
+impl SocialScene {
+    /// Whether a map can be made of the scene at `resolution` metres a cell.
+    pub(super) fn check(&self, resolution: f64) -> Result<(), SceneError> {
+        let bounds = self.bounds;
+        let [xmin, ymin, xmax, ymax] = bounds;
+        if !bounds.iter().all(|b| b.is_finite()) || xmin >= xmax || ymin >= ymax {
+            return Err(SceneError::Bounds { bounds });
+        }
+        if ((xmax - xmin) / resolution).ceil() * ((ymax - ymin) / resolution).ceil() > MOST_CELLS {
+            return Err(SceneError::TooLarge { bounds, resolution });
+        }
+        if !(self.robot_radius.is_finite() && self.robot_radius >= 0.0) {
+            return Err(SceneError::RobotRadius {
+                radius: self.robot_radius,
+            });
+        }
+        match self
+            .walls
+            .iter()
+            .position(|wall| !wall.iter().all(is_finite))
+        {
+            Some(index) => Err(SceneError::Wall { index }),
+            None => Ok(()),
+        }
+    }
+
+    /// The people who can be mapped.
+    pub(super) fn sound_people(&self, rejected: &mut Vec<Rejection>) -> Vec<Person> {
+        let mut people = Vec::with_capacity(self.people.len());
+        for person in &self.people {
+            let name = || person.name.clone();
+            if !is_pose(&person.world_from_person) {
+                rejected.push(Rejection::PersonPose { name: name() });
+                continue;
+            }
+            let mut person = person.clone();
+            if !person.velocity.iter().all(|v| v.is_finite()) {
+                rejected.push(Rejection::PersonVelocity { name: name() });
+                person.velocity = Vector2::zeros();
+            }
+            if !(person.radius.is_finite() && person.radius > 0.0) {
+                rejected.push(Rejection::PersonRadius {
+                    name: name(),
+                    radius: person.radius,
+                });
+                person.radius = BODY_RADIUS;
+            }
+            people.push(person);
+        }
+        people
+    }
+
+    /// The objects that can be mapped.
+    pub(super) fn sound_objects<'a>(&'a self, rejected: &mut Vec<Rejection>) -> Vec<&'a Object> {
+        let (sound, bad): (Vec<_>, Vec<_>) = self
+            .objects
+            .iter()
+            .partition(|o| is_pose(&o.world_from_object) && o.outline.is_valid());
+        rejected.extend(bad.iter().map(|o| Rejection::Object {
+            name: o.name.clone(),
+        }));
+        sound
+    }
+
+    /// The agenda of one object. Backward activities are left out here and reported by
+    /// [`Self::check_activities`].
+    pub(super) fn agenda(&self, object: &str) -> Vec<Agenda> {
+        self.activities
+            .iter()
+            .filter(|activity| activity.object == object)
+            .filter_map(|activity| Agenda::new(activity.start, activity.end).ok())
+            .collect()
+    }
+
+    /// Reports activities that are backward, or whose object is not among those `usable`.
+    pub(super) fn check_activities<'a>(
+        &self,
+        usable: impl Fn(&str) -> bool + 'a,
+        rejected: &mut Vec<Rejection>,
+    ) {
+        for activity in &self.activities {
+            let object = activity.object.clone();
+            if let Err(error) = Agenda::new(activity.start, activity.end) {
+                rejected.push(Rejection::ActivityOrder { object, error });
+            } else if !usable(&object) {
+                rejected.push(Rejection::ActivityObject { object });
+            }
+        }
+    }
+}
+
+fn is_finite(point: &Point2<f64>) -> bool {
+    point.x.is_finite() && point.y.is_finite()
+}
+
+fn is_pose(pose: &Isometry2<f64>) -> bool {
+    is_finite(&pose.translation.vector.into()) && pose.rotation.angle().is_finite()
+}

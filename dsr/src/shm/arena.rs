@@ -1,0 +1,232 @@
+//! The arena in shared memory: each segment is one giant sample that the store sends once and goes
+//! on writing through atomics, while every reader keeps the sample it received.
+//!
+//! iceoryx2 does not promise that a sample may be written after it was sent; its version is pinned
+//! and `tests/all/graph.rs` holds the construct.
+
+use super::{InstanceError, Ipc, IpcNode, MAX_PROCESSES, ipc, service_name};
+use crate::Epoch;
+use crate::arena::allocator::{Full, Growth};
+use crate::arena::{Arena, Segment, Word};
+use iceoryx2::port::publisher::Publisher as IpcPublisher;
+use iceoryx2::port::subscriber::Subscriber as IpcSubscriber;
+use iceoryx2::port::update_connections::UpdateConnections;
+use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy, ZeroCopySend};
+use iceoryx2::sample::Sample;
+use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use std::sync::Arc;
+
+/// log2 of the words in a segment: 64 MiB.
+const SHIFT: u32 = 23;
+/// Segments that an arena may grow to: 4 GiB in all.
+const CAPACITY: usize = 64;
+
+// SAFETY: a word is an `AtomicU64`: no pointer, no padding, any bits are a valid value, and
+// `repr(transparent)` fixes its layout for every process on the host.
+unsafe impl ZeroCopySend for Word {}
+
+/// Which segment of which arena a sample is.
+#[derive(Debug, Clone, Copy, Default, ZeroCopySend)]
+#[repr(C)]
+pub(crate) struct SegmentHeader {
+    epoch: u64,
+    index: u64,
+}
+
+type Factory = PortFactory<Ipc, [Word], SegmentHeader>;
+
+fn service(node: &IpcNode) -> Result<Factory, InstanceError> {
+    node.service_builder(&service_name("graph/arena")?)
+        .publish_subscribe::<[Word]>()
+        .user_header::<SegmentHeader>()
+        .max_publishers(2)
+        .max_subscribers(MAX_PROCESSES)
+        .max_nodes(MAX_PROCESSES)
+        .history_size(CAPACITY)
+        .subscriber_max_buffer_size(CAPACITY)
+        .subscriber_max_borrowed_samples(2 * CAPACITY)
+        .enable_safe_overflow(true)
+        .open_or_create()
+        .map_err(|e| ipc("the arena's service", e))
+}
+
+/// The store's end: makes segments and sends them to every process.
+#[derive(Debug)]
+pub(crate) struct ArenaPublisher {
+    publisher: Arc<IpcPublisher<Ipc, [Word], SegmentHeader>>,
+}
+
+impl ArenaPublisher {
+    pub(crate) fn open(node: &IpcNode) -> Result<Self, InstanceError> {
+        let publisher = service(node)?
+            .publisher_builder()
+            .initial_max_slice_len(1 << SHIFT)
+            .allocation_strategy(AllocationStrategy::Static)
+            .max_loaned_samples(1)
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            // Every segment is sent once and lives in the history; more are never loaned.
+            .override_sample_preallocation(|_| CAPACITY + 1)
+            .create()
+            .map_err(|e| ipc("the arena's publisher", e))?;
+        Ok(Self {
+            publisher: Arc::new(publisher),
+        })
+    }
+
+    /// An arena without segments, and what adds them.
+    pub(crate) fn arena(&self, epoch: Epoch) -> (Arc<Arena>, Box<dyn Growth>) {
+        let growth = SharedGrowth {
+            publisher: Arc::clone(&self.publisher),
+            epoch,
+        };
+        (Arc::new(Arena::new(CAPACITY, SHIFT)), Box::new(growth))
+    }
+
+    /// Hands the segments to processes that joined since the last call.
+    pub(crate) fn serve_newcomers(&self) {
+        // A connection that cannot be made is one whose process is gone.
+        if let Err(error) = self.publisher.update_connections() {
+            tracing::debug!("the arena's connections: {error}");
+        }
+    }
+}
+
+#[derive(Debug)]
+struct SharedGrowth {
+    publisher: Arc<IpcPublisher<Ipc, [Word], SegmentHeader>>,
+    epoch: Epoch,
+}
+
+impl Growth for SharedGrowth {
+    fn grow(&mut self, arena: &Arena, index: usize) -> Result<(), Full> {
+        if index >= CAPACITY {
+            return Err(Full);
+        }
+        let mut sample = self
+            .publisher
+            .loan_slice_uninit(1 << SHIFT)
+            .map_err(|_| Full)?;
+        *sample.user_header_mut() = SegmentHeader {
+            epoch: self.epoch.0,
+            index: index as u64,
+        };
+        let (start, len) = (sample.payload_mut().as_mut_ptr().cast::<Word>(), 1 << SHIFT);
+        // SAFETY: the payload is fresh shared memory, which the kernel hands out zeroed, and a
+        // word of zeros is a valid `Word`; no sample of this publisher is ever given back, so
+        // this one was not in use before.
+        let sample = unsafe { sample.assume_init() };
+        sample.send().map_err(|_| Full)?;
+        let publisher = Arc::clone(&self.publisher);
+        arena.attach(
+            index,
+            Box::new(OwnSegment {
+                _publisher: publisher,
+                start,
+                len,
+            }),
+        );
+        Ok(())
+    }
+
+    fn reserve(&mut self, _: usize, from: usize, to: usize) -> Result<(), Full> {
+        // Pages come into being when they are first touched, and touching one when there is no
+        // room for it kills the process; so ask first, with room to spare for the other writers.
+        const SPARE: u64 = 8 << 20;
+        let needed = ((to - from) * size_of::<Word>()) as u64;
+        let free = rustix::fs::statvfs(super::SHARED_MEMORY).map_or(0, |s| s.f_bavail * s.f_frsize);
+        if free < needed + SPARE {
+            Err(Full)
+        } else {
+            Ok(())
+        }
+    }
+}
+
+/// A segment as the store sees it: writable.
+#[derive(Debug)]
+struct OwnSegment {
+    /// Owns the memory.
+    _publisher: Arc<IpcPublisher<Ipc, [Word], SegmentHeader>>,
+    start: *const Word,
+    len: usize,
+}
+
+// SAFETY: the segment is a range of atomics, which any thread may use at any time, and the
+// publisher that owns it is itself safe to send and share.
+unsafe impl Send for OwnSegment {}
+// SAFETY: as above.
+unsafe impl Sync for OwnSegment {}
+
+impl Segment for OwnSegment {
+    fn words(&self) -> &[Word] {
+        // SAFETY: `start` points to `len` initialised words in the publisher's data segment, which
+        // stays mapped while `_publisher` lives; the sample stays in its history for ever, so the
+        // memory is never loaned again. Others only ever touch it through atomics.
+        unsafe { std::slice::from_raw_parts(self.start, self.len) }
+    }
+}
+
+/// A segment as a reader sees it: mapped read-only.
+#[derive(Debug)]
+struct ReceivedSegment(Sample<Ipc, [Word], SegmentHeader>);
+
+// SAFETY: the sample is only read through `words`, which gives atomics in memory that stays mapped
+// while the sample lives; the thread-safe service variant guards the rest of it.
+unsafe impl Sync for ReceivedSegment {}
+
+impl Segment for ReceivedSegment {
+    fn words(&self) -> &[Word] {
+        self.0.payload()
+    }
+}
+
+/// A reader's end: receives segments, and notices a new store.
+#[derive(Debug)]
+pub(crate) struct ArenaSubscriber {
+    subscriber: IpcSubscriber<Ipc, [Word], SegmentHeader>,
+    arena: Option<(Epoch, Arc<Arena>)>,
+    /// Segments of an epoch whose first segment is not here yet.
+    early: Vec<Sample<Ipc, [Word], SegmentHeader>>,
+}
+
+impl ArenaSubscriber {
+    pub(crate) fn open(node: &IpcNode) -> Result<Self, InstanceError> {
+        let subscriber = service(node)?
+            .subscriber_builder()
+            .buffer_size(CAPACITY)
+            .create()
+            .map_err(|e| ipc("the arena's subscriber", e))?;
+        Ok(Self {
+            subscriber,
+            arena: None,
+            early: Vec::new(),
+        })
+    }
+
+    /// The newest store's arena as far as it has arrived.
+    pub(crate) fn poll(&mut self) -> Result<Option<(Epoch, Arc<Arena>)>, InstanceError> {
+        while let Some(sample) = self.subscriber.receive().map_err(|e| ipc("the arena", e))? {
+            let header = *sample.user_header();
+            let known = self.arena.as_ref().map(|(epoch, _)| epoch.0);
+            if header.index == 0 && known != Some(header.epoch) {
+                // A first segment of another epoch: a new store, whose arena replaces the old.
+                let arena = Arc::new(Arena::new(CAPACITY, SHIFT));
+                arena.attach(0, Box::new(ReceivedSegment(sample)));
+                self.arena = Some((Epoch(header.epoch), Arc::clone(&arena)));
+                for early in self.early.drain(..) {
+                    if early.user_header().epoch == header.epoch {
+                        let index = early.user_header().index as usize;
+                        arena.attach(index, Box::new(ReceivedSegment(early)));
+                    }
+                }
+            } else if known == Some(header.epoch) {
+                if let Some((_, arena)) = &self.arena {
+                    arena.attach(header.index as usize, Box::new(ReceivedSegment(sample)));
+                }
+            } else {
+                self.early.push(sample);
+            }
+        }
+        Ok(self.arena.clone())
+    }
+}

@@ -1,0 +1,196 @@
+//! The store's process: takes requests, lets the graph's single writer decide, answers, and tells
+//! everybody what changed. It guarantees that a request that was answered is not applied again.
+
+use super::arena::ArenaPublisher;
+use super::session::{CHANGES, COMMITS_EVENT, REQUESTS_EVENT, Request, event, requests};
+use super::{Instance, InstanceError, Ipc, IpcNode, Publisher, ipc};
+use crate::arena::allocator::Full;
+use crate::graph::Image;
+use crate::{Change, Commit, Epoch, Graph, Refusal, Schema, Time, Transaction};
+use iceoryx2::port::listener::Listener;
+use iceoryx2::port::notifier::Notifier;
+use iceoryx2::port::server::Server;
+use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
+use std::collections::BTreeMap;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use thiserror::Error;
+
+/// Why a store cannot start or go on.
+#[derive(Debug, Error)]
+pub enum StoreError {
+    /// The instance cannot be used.
+    #[error(transparent)]
+    Instance(#[from] InstanceError),
+    /// There is no room in shared memory for the smallest graph.
+    #[error("no room in /dev/shm for a graph; free some memory or mount it larger")]
+    OutOfMemory,
+    /// The graph refused what it should start with.
+    #[error("the initial graph was refused: {0}")]
+    Refused(#[from] Refusal),
+}
+
+/// An answer as it was given.
+type Answer = Result<Commit, Refusal>;
+
+/// The store of an instance: one process holds it, and it alone writes the graph.
+#[derive(Debug)]
+pub struct Store {
+    graph: Graph,
+    arena: ArenaPublisher,
+    server: Server<Ipc, [u8], (), [u8], ()>,
+    wake: Listener<Ipc>,
+    commits: Notifier<Ipc>,
+    changes: Publisher<Change>,
+    /// The last request of each client, with its answer.
+    answered: BTreeMap<u64, (u64, Answer)>,
+    last_time: Time,
+    // Dropped last: the ports above belong to it.
+    node: IpcNode,
+}
+
+impl Store {
+    /// Opens the store of an instance with an empty graph.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn open(instance: &Instance, schema: Schema) -> Result<Self, StoreError> {
+        instance.create_folder()?;
+        let node = instance.join()?;
+        let arena = ArenaPublisher::open(&node)?;
+        let epoch = new_epoch();
+        let (memory, growth) = arena.arena(epoch);
+        let graph =
+            Graph::on(memory, growth, schema, epoch).map_err(|Full| StoreError::OutOfMemory)?;
+        let server = requests(&node)?
+            .server_builder()
+            .initial_max_slice_len(1024)
+            .allocation_strategy(AllocationStrategy::PowerOfTwo)
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .create()
+            .map_err(|e| ipc("the store's server", e))?;
+        let wake = event(&node, REQUESTS_EVENT)?
+            .listener_builder()
+            .create()
+            .map_err(|e| ipc("the store's listener", e))?;
+        let commits = event(&node, COMMITS_EVENT)?
+            .notifier_builder()
+            .create()
+            .map_err(|e| ipc("the store's notifier", e))?;
+        let changes = Publisher::open(&node, CHANGES)?;
+        let answered = BTreeMap::new();
+        let last_time = Time::default();
+        Ok(Self {
+            graph,
+            arena,
+            server,
+            wake,
+            commits,
+            changes,
+            answered,
+            last_time,
+            node,
+        })
+    }
+
+    /// Fills the empty graph with what another store's memory held; versions go on from there.
+    ///
+    /// # Errors
+    /// [`StoreError::Refused`].
+    pub fn restore(&mut self, image: &Image) -> Result<(), StoreError> {
+        self.graph.restore(image)?;
+        self.last_time = self.graph.snapshot().time();
+        Ok(())
+    }
+
+    /// The graph's writer, for what the store's own process does before it serves.
+    pub fn graph_mut(&mut self) -> &mut Graph {
+        &mut self.graph
+    }
+
+    /// Commits in the store's own name.
+    ///
+    /// # Errors
+    /// [`Refusal`].
+    pub fn commit(&mut self, transaction: &Transaction, time: Time) -> Result<Commit, Refusal> {
+        self.decide(transaction, "store", time)
+    }
+
+    fn decide(&mut self, transaction: &Transaction, agent: &str, time: Time) -> Answer {
+        // Agents at the edge of a tick may be a tick apart; the graph's time does not run back.
+        self.last_time = self.last_time.max(time);
+        let (commit, change) = self.graph.commit(transaction, agent, self.last_time)?;
+        if let Err(error) = self.changes.send(&change) {
+            // The commit stands; who listens sees the gap and reads the snapshot.
+            tracing::warn!("change {} was not sent: {error}", commit.version);
+        }
+        Ok(commit)
+    }
+
+    /// Answers every request that has come, waiting up to `patience` for the first. How many.
+    ///
+    /// # Errors
+    /// [`StoreError::Instance`] where the instance's shared memory is gone.
+    pub fn serve(&mut self, patience: Duration) -> Result<usize, StoreError> {
+        self.wake
+            .timed_wait(|_| (), patience)
+            .map_err(|e| ipc("waiting for requests", e))?;
+        self.arena.serve_newcomers();
+        let mut served = 0;
+        while let Some(active) = self
+            .server
+            .receive()
+            .map_err(|e| ipc("receiving a request", e))?
+        {
+            let answer = match postcard::from_bytes::<Request>(active.payload()) {
+                Err(error) => Err(Refusal::Malformed(error.to_string())),
+                Ok(request) => match self.answered.get(&request.client) {
+                    Some((last, answer)) if *last == request.sequence => answer.clone(),
+                    _ => {
+                        let answer =
+                            self.decide(&request.transaction, &request.agent, request.time);
+                        let entry = (request.sequence, answer.clone());
+                        self.answered.insert(request.client, entry);
+                        answer
+                    }
+                },
+            };
+            let bytes = postcard::to_stdvec(&answer).map_err(|e| ipc("encoding an answer", e))?;
+            match active.loan_slice_uninit(bytes.len()) {
+                // A client that went away meanwhile does not hear; that is its affair.
+                Ok(response) => drop(response.write_from_slice(&bytes).send()),
+                Err(error) => tracing::warn!("an answer was not sent: {error}"),
+            }
+            served += 1;
+        }
+        if served > 0
+            && let Err(error) = self.commits.notify()
+        {
+            tracing::debug!("waking the agents: {error}");
+        }
+        Ok(served)
+    }
+
+    /// Removes what processes that died left in the instance.
+    pub fn clean_up_after_the_dead(&self) {
+        let state = self.node.try_cleanup_dead_nodes();
+        if state.cleanups + state.failed_cleanups > 0 {
+            tracing::info!(
+                "dead processes: {} cleaned, {} not",
+                state.cleanups,
+                state.failed_cleanups
+            );
+        }
+    }
+}
+
+/// A number that no other store of this instance had: the time of day, in nanoseconds.
+#[allow(
+    clippy::disallowed_methods,
+    reason = "the store's process owns the clock"
+)]
+fn new_epoch() -> Epoch {
+    let since = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .unwrap_or_default();
+    Epoch(since.as_nanos() as u64)
+}

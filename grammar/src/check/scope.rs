@@ -1,0 +1,286 @@
+//! Rules, conditions, effects and expressions against the variables in scope.
+//!
+//! Guarantee: every name in a condition, effect or expression was looked up in its scope.
+
+use super::Check;
+use crate::{
+    AttributePath, Condition, Effect, Expression, Literal, Name, PatternNode, Problem, Rule,
+};
+
+/// The variables that may be used at a place.
+pub(super) struct Scope {
+    words: &'static str,
+    bound: Vec<Name>,
+    deleted: Vec<Name>,
+}
+
+impl Scope {
+    pub(super) fn new(words: &'static str) -> Self {
+        Self {
+            words,
+            bound: Vec::new(),
+            deleted: Vec::new(),
+        }
+    }
+
+    pub(super) fn words(&self) -> &'static str {
+        self.words
+    }
+
+    pub(super) fn extend<'a>(&mut self, nodes: impl IntoIterator<Item = &'a PatternNode>) {
+        self.bound
+            .extend(nodes.into_iter().map(|node| node.variable.clone()));
+    }
+
+    pub(super) fn contains(&self, name: &str) -> bool {
+        self.bound.iter().any(|bound| bound == name)
+    }
+
+    pub(super) fn is_deleted(&self, name: &str) -> bool {
+        self.deleted.iter().any(|deleted| deleted == name)
+    }
+
+    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
+        self.bound.iter().map(Name::as_str)
+    }
+}
+
+impl Check<'_> {
+    pub(super) fn rule(&mut self, rule: &Rule) {
+        self.pattern(&rule.left, &rule.parameters, "left", "on the left side");
+        self.pattern(&rule.right, &rule.parameters, "right", "on the right side");
+        self.declarations(&rule.parameters);
+
+        let mut before = Scope::new("on the left side or among the parameters");
+        before.extend(rule.bound_nodes());
+        for expression in [Some(&rule.cost), rule.duration.as_ref()]
+            .into_iter()
+            .flatten()
+        {
+            self.expression(expression, &before);
+            if let Some(found) = constant_kind(expression).filter(|kind| *kind != "a number") {
+                let (operator, expected) = ("a cost or duration", "a number");
+                self.report(
+                    &rule.name,
+                    Problem::WrongOperand {
+                        operator,
+                        expected,
+                        found,
+                    },
+                );
+            }
+        }
+        if let Some(condition) = &rule.precondition {
+            self.condition(condition, &mut before);
+        }
+
+        let mut after = Scope::new("in this rule");
+        let kept = |node: &&PatternNode| {
+            rule.left.node(&node.variable).is_none() || rule.right.node(&node.variable).is_some()
+        };
+        after.extend(rule.bound_nodes().filter(kept));
+        let created =
+            |node: &&PatternNode| !rule.bound_nodes().any(|b| b.variable == node.variable);
+        after.extend(rule.right.nodes.iter().filter(created));
+        after.deleted = before
+            .bound
+            .iter()
+            .filter(|name| !after.contains(name))
+            .cloned()
+            .collect();
+        self.effects(&rule.effect, &before, &mut after);
+    }
+
+    pub(super) fn condition(&mut self, condition: &Condition, scope: &mut Scope) {
+        match condition {
+            Condition::Edge { from, to, .. } => {
+                self.variable(from, scope);
+                self.variable(to, scope);
+            }
+            Condition::Same(first, second) => {
+                self.variable(first, scope);
+                self.variable(second, scope);
+            }
+            Condition::Compare {
+                operator,
+                left,
+                right,
+            } => {
+                self.expression(left, scope);
+                self.expression(right, scope);
+                self.comparable(*operator, left, right);
+            }
+            Condition::Not(inner) => self.condition(inner, scope),
+            Condition::And(all) | Condition::Or(all) => {
+                for inner in all {
+                    self.condition(inner, scope);
+                }
+            }
+            Condition::Exists { variables, body } | Condition::Forall { variables, body } => {
+                let outer = self.quantify(variables, scope);
+                self.condition(body, scope);
+                scope.bound.truncate(outer);
+            }
+            Condition::When {
+                condition,
+                consequence,
+            } => {
+                self.condition(condition, scope);
+                self.condition(consequence, scope);
+            }
+        }
+    }
+
+    /// Brings quantified variables into scope. Gives the scope's size before.
+    fn quantify(&mut self, variables: &[PatternNode], scope: &mut Scope) -> usize {
+        self.declarations(variables);
+        for variable in variables {
+            let outer = scope
+                .bound
+                .iter()
+                .find(|bound| **bound == variable.variable)
+                .cloned();
+            if let Some(outer) = outer {
+                self.duplicate("variable", &outer, &variable.variable);
+            }
+        }
+        let before = scope.bound.len();
+        scope.extend(variables);
+        before
+    }
+
+    /// `before` is what conditions and values see, `after` what links and writes may name.
+    fn effects(&mut self, effects: &[Effect], before: &Scope, after: &mut Scope) {
+        let outer = after.bound.len();
+        for effect in effects {
+            match effect {
+                Effect::Link { from, to, .. } | Effect::Unlink { from, to, .. } => {
+                    self.variable(from, after);
+                    self.variable(to, after);
+                }
+                Effect::Assign { target, value } => {
+                    self.path(target, after);
+                    self.expression(value, before);
+                }
+                Effect::Create {
+                    variable,
+                    type_name,
+                } => {
+                    let known = after.bound.iter().chain(&before.bound);
+                    let known = known
+                        .chain(&after.deleted)
+                        .find(|name| *name == variable)
+                        .cloned();
+                    if let Some(first) = known {
+                        self.duplicate("variable", &first, variable);
+                    }
+                    self.type_name(type_name);
+                    after.bound.push(variable.clone());
+                }
+                Effect::Delete { variable } => self.variable(variable, after),
+                Effect::Retype {
+                    variable,
+                    type_name,
+                } => {
+                    self.variable(variable, after);
+                    self.type_name(type_name);
+                }
+                Effect::Forall { variables, body } => {
+                    let mut inner = Scope::new(before.words);
+                    inner.bound.clone_from(&before.bound);
+                    self.quantify(variables, &mut inner);
+                    let size = after.bound.len();
+                    after.extend(variables);
+                    self.effects(body, &inner, after);
+                    after.bound.truncate(size);
+                }
+                Effect::When { condition, body } => {
+                    let mut inner = Scope::new(before.words);
+                    inner.bound.clone_from(&before.bound);
+                    self.condition(condition, &mut inner);
+                    self.effects(body, before, after);
+                }
+            }
+        }
+        after.bound.truncate(outer);
+    }
+
+    fn path(&mut self, path: &AttributePath, scope: &Scope) {
+        match path {
+            AttributePath::Node { variable, .. } => self.variable(variable, scope),
+            AttributePath::Edge { from, to, .. } => {
+                self.variable(from, scope);
+                self.variable(to, scope);
+            }
+        }
+    }
+
+    fn expression(&mut self, expression: &Expression, scope: &Scope) {
+        match expression {
+            Expression::Literal(_) => {}
+            Expression::Attribute(path) => self.path(path, scope),
+            Expression::Arithmetic { operator, operands } => {
+                for operand in operands {
+                    self.expression(operand, scope);
+                    if let Some(found) = constant_kind(operand).filter(|k| *k != "a number")
+                        && let Some(at) = names(expression).next().or(scope.bound.first())
+                    {
+                        let (operator, expected) = (operator.symbol(), "numbers");
+                        self.report(
+                            at,
+                            Problem::WrongOperand {
+                                operator,
+                                expected,
+                                found,
+                            },
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    /// Two operands of which one is constant and the comparison can never be made.
+    fn comparable(&mut self, operator: crate::Comparison, left: &Expression, right: &Expression) {
+        use crate::Comparison::{Equal, NotEqual};
+        let ordered = !matches!(operator, Equal | NotEqual);
+        for (operand, other) in [(left, right), (right, left)] {
+            let Some(found) = constant_kind(operand).filter(|kind| *kind != "a number") else {
+                continue;
+            };
+            if ordered && let Some(at) = names(other).next() {
+                let (operator, expected) = (operator.symbol(), "numbers");
+                self.report(
+                    at,
+                    Problem::WrongOperand {
+                        operator,
+                        expected,
+                        found,
+                    },
+                );
+            }
+        }
+    }
+}
+
+/// What kind of value it is, if that is known without a graph.
+fn constant_kind(expression: &Expression) -> Option<&'static str> {
+    match expression {
+        Expression::Literal(Literal::Integer(_) | Literal::Real(_))
+        | Expression::Arithmetic { .. } => Some("a number"),
+        Expression::Literal(Literal::Text(_)) => Some("text"),
+        Expression::Literal(Literal::Boolean(_)) => Some("true or false"),
+        Expression::Attribute(_) => None,
+    }
+}
+
+/// The names in it that know where they stand.
+fn names(expression: &Expression) -> Box<dyn Iterator<Item = &Name> + '_> {
+    match expression {
+        Expression::Literal(_) => Box::new(std::iter::empty()),
+        Expression::Attribute(
+            AttributePath::Node { variable: name, .. } | AttributePath::Edge { from: name, .. },
+        ) => Box::new(std::iter::once(name)),
+        Expression::Arithmetic { operands, .. } => Box::new(operands.iter().flat_map(names)),
+    }
+}

@@ -1,0 +1,332 @@
+//! What is wrong with a file, where, and what would be right.
+//!
+//! Guarantee: every diagnostic points into the file it speaks of, and renders with miette.
+
+use crate::{SourceFile, Span};
+use miette::{LabeledSpan, MietteError, SourceCode, SourceSpan, SpanContents};
+use std::fmt;
+
+/// One defect of a grammar or goal file.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{problem}")]
+pub struct Diagnostic {
+    /// What is wrong.
+    pub problem: Problem,
+    /// Where.
+    pub span: Span,
+    /// The file that `span` lies in.
+    pub file: SourceFile,
+    /// An earlier place of the same file that belongs to it, and what it is.
+    pub related: Option<(Span, String)>,
+}
+
+impl Diagnostic {
+    /// Whether the file must not be used as it is, or may.
+    pub fn severity(&self) -> Severity {
+        self.problem.severity()
+    }
+
+    /// Line and column of its first character, counted from 1.
+    pub fn line_and_column(&self) -> (usize, usize) {
+        self.file.line_and_column(self.span.start)
+    }
+}
+
+/// How bad a defect is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Severity {
+    /// Suspicious, but its meaning is clear.
+    Warning,
+    /// The file is wrong; what could be read of it is there nevertheless.
+    Error,
+}
+
+impl fmt::Display for Severity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Warning => "warning",
+            Self::Error => "error",
+        })
+    }
+}
+
+/// Every way in which a grammar or goal file can be wrong.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Problem {
+    /// The text does not follow the syntax.
+    #[error("expected {expected}, found {found}")]
+    Expected {
+        /// What may stand here.
+        expected: String,
+        /// What stands here.
+        found: String,
+        /// What was probably meant.
+        suggestion: Option<String>,
+    },
+    /// A character that no token begins with.
+    #[error("unknown character {0:?}")]
+    UnknownCharacter(char),
+    /// A text in quotes that its line does not end.
+    #[error("this text has no closing quote on its line")]
+    UnclosedText,
+    /// A bracket whose partner is missing.
+    #[error("`{opening}` is never closed")]
+    Unclosed {
+        /// The bracket.
+        opening: char,
+    },
+    /// A bracket that closes nothing.
+    #[error("`{0}` closes nothing")]
+    Stray(String),
+    /// A number outside of what is allowed.
+    #[error("{what} must be {range}, not {found}")]
+    OutOfRange {
+        /// Which number.
+        what: &'static str,
+        /// What it may be.
+        range: &'static str,
+        /// What it is.
+        found: String,
+    },
+    /// Formulas nested deeper than [`crate::DEPTH_LIMIT`].
+    #[error("nested more than {limit} deep")]
+    TooDeep {
+        /// The limit.
+        limit: usize,
+    },
+    /// The same clause, block or header twice.
+    #[error("{what} is given twice")]
+    Repeated {
+        /// What.
+        what: String,
+    },
+    /// A name declared twice in one scope.
+    #[error("{what} `{name}` is declared twice")]
+    Duplicate {
+        /// Kind of thing: variable, type, rule, alias, link.
+        what: &'static str,
+        /// Its name.
+        name: String,
+    },
+    /// A variable that its scope does not have.
+    #[error("no variable `{name}` {scope}")]
+    UnknownVariable {
+        /// As written.
+        name: String,
+        /// The scope, in words ("on the left side").
+        scope: &'static str,
+        /// What was probably meant.
+        suggestion: Option<String>,
+    },
+    /// A type that is not declared.
+    #[error("no type `{name}`")]
+    UnknownType {
+        /// As written.
+        name: String,
+        /// What was probably meant.
+        suggestion: Option<String>,
+    },
+    /// A rule, combo step or alias that is not there.
+    #[error("no {what} `{name}`")]
+    UnknownName {
+        /// Kind of thing: rule, alias.
+        what: &'static str,
+        /// As written.
+        name: String,
+        /// What was probably meant.
+        suggestion: Option<String>,
+    },
+    /// A type that inherits from itself.
+    #[error("type `{name}` inherits from itself")]
+    CyclicType {
+        /// The type.
+        name: String,
+    },
+    /// The same link both wanted and starred on one side.
+    #[error("the link `{link}` is both there and starred on the {side} side")]
+    Contradiction {
+        /// As written.
+        link: String,
+        /// `left` or `right`.
+        side: &'static str,
+    },
+    /// A node used in an effect although the rule deletes it.
+    #[error("`{name}` is deleted by this rule")]
+    Deleted {
+        /// The variable.
+        name: String,
+    },
+    /// Variables that a combo equates although no node can be both.
+    #[error("`{first}` is a `{first_type}` and `{second}` a `{second_type}`: never the same node")]
+    Incompatible {
+        /// One variable with its alias.
+        first: String,
+        /// Its type.
+        first_type: String,
+        /// The other variable with its alias.
+        second: String,
+        /// Its type.
+        second_type: String,
+    },
+    /// An operand of the wrong kind: text in an addition, say.
+    #[error("{operator} takes {expected}, not {found}")]
+    WrongOperand {
+        /// As written.
+        operator: &'static str,
+        /// What it takes.
+        expected: &'static str,
+        /// What stands there.
+        found: &'static str,
+    },
+    /// An included file that could not be read.
+    #[error("cannot read the included file `{path}`: {reason}")]
+    Include {
+        /// As written.
+        path: String,
+        /// Why.
+        reason: String,
+    },
+}
+
+impl Problem {
+    /// Whether the file must not be used as it is, or may.
+    pub fn severity(&self) -> Severity {
+        match self {
+            Self::Incompatible { .. } => Severity::Warning,
+            _ => Severity::Error,
+        }
+    }
+
+    /// What to do about it, where that is known.
+    pub fn help(&self) -> Option<String> {
+        match self {
+            Self::Expected { suggestion, .. }
+            | Self::UnknownVariable { suggestion, .. }
+            | Self::UnknownType { suggestion, .. }
+            | Self::UnknownName { suggestion, .. } => suggestion
+                .as_ref()
+                .map(|name| format!("did you mean `{name}`?")),
+            Self::Stray(_) => Some("remove it, or look for a missing opening bracket".to_owned()),
+            Self::Deleted { .. } => {
+                Some("keep the node on the right side, or leave the effect out".to_owned())
+            }
+            _ => None,
+        }
+    }
+}
+
+impl miette::Diagnostic for Diagnostic {
+    fn severity(&self) -> Option<miette::Severity> {
+        Some(match self.problem.severity() {
+            Severity::Warning => miette::Severity::Warning,
+            Severity::Error => miette::Severity::Error,
+        })
+    }
+
+    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        self.problem
+            .help()
+            .map(|help| Box::new(help) as Box<dyn fmt::Display>)
+    }
+
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        Some(&self.file)
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        let here = match &self.problem {
+            Problem::Expected { expected, .. } => format!("expected {expected}"),
+            _ => "here".to_owned(),
+        };
+        let here = LabeledSpan::new_primary_with_span(Some(here), source_span(self.span));
+        let related = self.related.as_ref().map(|(span, words)| {
+            LabeledSpan::new_with_span(Some(words.clone()), source_span(*span))
+        });
+        Some(Box::new(std::iter::once(here).chain(related)))
+    }
+}
+
+fn source_span(span: Span) -> SourceSpan {
+    SourceSpan::new(span.start.into(), span.end.saturating_sub(span.start))
+}
+
+impl SourceCode for SourceFile {
+    fn read_span<'a>(
+        &'a self,
+        span: &SourceSpan,
+        lines_before: usize,
+        lines_after: usize,
+    ) -> Result<Box<dyn SpanContents<'a> + 'a>, MietteError> {
+        let contents = self.text().read_span(span, lines_before, lines_after)?;
+        Ok(Box::new(miette::MietteSpanContents::new_named(
+            self.name().to_owned(),
+            contents.data(),
+            *contents.span(),
+            contents.line(),
+            contents.column(),
+            contents.line_count(),
+        )))
+    }
+}
+
+/// The candidate nearest to `name`, if it is near enough to be a misspelling: at most a third of
+/// the longer one's letters differ. Ties go to the first in alphabetical order.
+pub(crate) fn nearest<'a>(
+    name: &str,
+    candidates: impl IntoIterator<Item = &'a str>,
+) -> Option<String> {
+    candidates
+        .into_iter()
+        .map(|candidate| (edit_distance(name, candidate), candidate))
+        .filter(|&(distance, candidate)| {
+            let longer = name.chars().count().max(candidate.chars().count());
+            distance > 0 && (distance * 3 <= longer || (distance == 1 && longer > 1))
+        })
+        .min()
+        .map(|(_, candidate)| candidate.to_owned())
+}
+
+/// Insertions, deletions, replacements and exchanges of neighbours that lead from `a` to `b`
+/// (optimal string alignment).
+fn edit_distance(a: &str, b: &str) -> usize {
+    const LONGEST: usize = 64;
+    let a: Vec<char> = a.chars().take(LONGEST).collect();
+    let b: Vec<char> = b.chars().take(LONGEST).collect();
+    let mut before: Vec<usize> = Vec::new();
+    let mut above: Vec<usize> = (0..=b.len()).collect();
+    for (i, &x) in a.iter().enumerate() {
+        let mut row = vec![i + 1];
+        for (j, &y) in b.iter().enumerate() {
+            let replaced = above[j] + usize::from(x != y);
+            let mut cost = replaced.min(above[j + 1] + 1).min(row[j] + 1);
+            if i > 0 && j > 0 && x == b[j - 1] && a[i - 1] == y {
+                cost = cost.min(before[j - 1] + 1);
+            }
+            row.push(cost);
+        }
+        before = std::mem::replace(&mut above, row);
+    }
+    above[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn suggestions_are_near_and_never_the_name_itself() {
+        let names = ["robot", "room1", "room2", "person"];
+        assert_eq!(nearest("robto", names).as_deref(), Some("robot"));
+        assert_eq!(nearest("room3", names).as_deref(), Some("room1"));
+        assert_eq!(nearest("kitchen", names), None);
+        assert_eq!(nearest("robot", ["robot"]), None);
+    }
+
+    #[test]
+    fn exchanged_neighbours_are_one_step() {
+        assert_eq!(edit_distance("form", "from"), 1);
+        assert_eq!(edit_distance("", "abc"), 3);
+        assert_eq!(edit_distance("same", "same"), 0);
+    }
+}

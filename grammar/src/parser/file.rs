@@ -1,0 +1,255 @@
+//! A whole grammar file: header, types, rules, combos, includes.
+//!
+//! Guarantee: everything between two readable items is either part of one or reported.
+
+use super::rule::Action;
+use super::{Finding, NodeNames, Parser};
+use crate::lexer::TokenKind;
+use crate::{Combo, Include, Name, Problem, Property, Rule, Span, TypeDeclaration, Types};
+
+/// A grammar file by itself, its includes not followed.
+#[derive(Debug, Default)]
+pub(crate) struct ParsedFile {
+    pub(crate) properties: Vec<Property>,
+    pub(crate) types: Types,
+    pub(crate) items: Vec<Item>,
+    pub(crate) comments: Vec<String>,
+    /// Names of rules and combos that are there but could not be read.
+    pub(crate) broken: Vec<Name>,
+    pub(crate) findings: Vec<Finding>,
+}
+
+/// What stands between the types block and the end.
+#[derive(Debug)]
+pub(crate) enum Item {
+    Rule(Box<Rule>),
+    Combo(Combo),
+    Include(Include),
+}
+
+/// Reads a grammar file that will have index `file` in its grammar.
+pub(crate) fn parse_file(text: &str, file: u32) -> ParsedFile {
+    let mut parsed = ParsedFile::default();
+    let start = header(text, file, &mut parsed);
+    let mut parser = Parser::new(text, file, start, NodeNames::Rule);
+    parser
+        .findings
+        .splice(0..0, std::mem::take(&mut parsed.findings));
+    parser.items(&mut parsed);
+    let rest = parser.comments_before(usize::MAX);
+    parsed.comments.extend(rest);
+    parsed.findings = parser.findings;
+    parsed
+}
+
+/// Reads `key = value` lines up to `===`. Gives the byte after it.
+fn header(text: &str, file: u32, parsed: &mut ParsedFile) -> usize {
+    let mut offset = 0;
+    for line in text.split_inclusive('\n') {
+        let content = line.trim();
+        let start = offset + (line.len() - line.trim_start().len());
+        let content_span = Span::new(file, start, start + content.len());
+        offset += line.len();
+        if content.len() >= 3 && content.bytes().all(|byte| byte == b'=') {
+            return offset;
+        }
+        if content.is_empty() {
+            continue;
+        }
+        if let Some(comment) = content.strip_prefix('#') {
+            parsed.comments.push(comment.trim().to_owned());
+            continue;
+        }
+        let property = content.split_once('=').filter(|(key, _)| {
+            let key = key.trim_end();
+            !key.is_empty()
+                && key
+                    .chars()
+                    .all(|c| c.is_alphanumeric() || matches!(c, '_' | '-' | '.'))
+        });
+        if let Some((key, value)) = property {
+            let key = key.trim_end();
+            let span = Span::new(file, start, start + key.len());
+            let value = value.trim().to_owned();
+            parsed.properties.push(Property {
+                key: Name::new(key, span),
+                value,
+            });
+            continue;
+        }
+        let problem = Problem::Expected {
+            expected: "`key = value` or `===`".to_owned(),
+            found: "something else".to_owned(),
+            suggestion: None,
+        };
+        parsed.findings.push(Finding {
+            span: content_span,
+            problem,
+            related: None,
+        });
+        if content.contains([':', '{', '(']) || content == "types" {
+            return start;
+        }
+    }
+    let problem = Problem::Expected {
+        expected: "`===` after the header".to_owned(),
+        found: "the end".to_owned(),
+        suggestion: None,
+    };
+    let end = Span::new(file, text.len(), text.len());
+    parsed.findings.push(Finding {
+        span: end,
+        problem,
+        related: None,
+    });
+    text.len()
+}
+
+impl Parser<'_> {
+    fn items(&mut self, parsed: &mut ParsedFile) {
+        loop {
+            self.limit = self.tokens.len();
+            let Some(token) = self.peek().cloned() else {
+                break;
+            };
+            if self.is_word("include") && self.is_symbol_at(self.at + 1, "(") {
+                let comments = self.comments_before(token.range.start);
+                if let Some(path) = self.include() {
+                    parsed.items.push(Item::Include(Include { path, comments }));
+                } else {
+                    self.skip_to_item();
+                }
+            } else if self.is_word("types") && self.is_symbol_at(self.at + 1, "{") {
+                if !parsed.types.is_empty() {
+                    let what = "`types`".to_owned();
+                    self.report(token.range, Problem::Repeated { what });
+                }
+                self.types(&mut parsed.types);
+                let end = self.tokens[self.at.saturating_sub(1)].range.end;
+                parsed.comments.extend(self.comments_before(end));
+            } else if token.kind == TokenKind::Word || self.is_digits(self.at) {
+                let action = self.action();
+                let end = self.tokens[self.at.saturating_sub(1)].range.end;
+                let comments = self.comments_before(end);
+                match action {
+                    Action::Rule(mut rule) => {
+                        rule.comments = comments;
+                        parsed.items.push(Item::Rule(rule));
+                    }
+                    Action::Combo(mut combo) => {
+                        combo.comments = comments;
+                        parsed.items.push(Item::Combo(combo));
+                    }
+                    Action::Broken(name) => parsed.broken.extend(name),
+                }
+            } else if let TokenKind::Symbol(symbol @ ("===" | "}" | ")")) = token.kind {
+                self.bump();
+                self.report(token.range, Problem::Stray(symbol.to_owned()));
+            } else {
+                self.expected("a rule, `include(path)` or the end", &[]);
+                self.skip_to_item();
+            }
+        }
+    }
+
+    /// Takes the comments that begin before byte `end`.
+    fn comments_before(&mut self, end: usize) -> Vec<String> {
+        let taken = self.comments.partition_point(|(start, _)| *start < end);
+        self.comments
+            .drain(..taken)
+            .map(|(_, words)| words)
+            .collect()
+    }
+
+    fn include(&mut self) -> Option<Name> {
+        self.bump();
+        self.bump();
+        if self
+            .peek()
+            .is_none_or(|token| token.kind != TokenKind::Path)
+        {
+            self.expected("the path of a grammar file", &[]);
+            return None;
+        }
+        let range = self.bump();
+        let raw = &self.text[range.clone()];
+        let start = range.start + (raw.len() - raw.trim_start().len());
+        let path = raw.trim();
+        let name = Name::new(path, self.span(start..start + path.len()));
+        self.expect(")", "`)` after the path")?;
+        Some(name)
+    }
+
+    fn types(&mut self, types: &mut Types) {
+        self.bump();
+        let opening = self.bump();
+        self.limit = self
+            .beginnings
+            .first()
+            .copied()
+            .unwrap_or(self.tokens.len())
+            .max(self.at);
+        loop {
+            if self.eat("}") {
+                break;
+            }
+            if self.peek().is_none() || self.is_symbol("===") || self.is_symbol("{") {
+                self.report(opening.clone(), Problem::Unclosed { opening: '{' });
+                break;
+            }
+            let before = self.at;
+            let declaration = self.type_declaration();
+            if declaration.is_none() {
+                self.skip_broken_line(before);
+            }
+            types.declarations.extend(declaration);
+        }
+        if !self.eat("===") {
+            self.expected("`===` after the types", &[]);
+        }
+    }
+
+    fn type_declaration(&mut self) -> Option<TypeDeclaration> {
+        self.expect("(", "`( type : parent )` or `}`")?;
+        let mut declaration = TypeDeclaration {
+            names: Vec::new(),
+            parents: Vec::new(),
+        };
+        declaration.names.push(self.name("a type")?);
+        while !self.is_symbol(")") && !self.is_symbol(":") {
+            declaration.names.push(self.name("a type, `:` or `)`")?);
+        }
+        if self.eat(":") {
+            declaration
+                .parents
+                .push(self.name("the type that is inherited from")?);
+            while !self.is_symbol(")") {
+                declaration.parents.push(self.name("a type or `)`")?);
+            }
+        }
+        self.expect(")", "`)`")?;
+        Some(declaration)
+    }
+
+    /// Skips to the next token at which an item can begin.
+    fn skip_to_item(&mut self) {
+        let next = self
+            .beginnings
+            .partition_point(|&beginning| beginning <= self.at);
+        let next = self
+            .beginnings
+            .get(next)
+            .copied()
+            .unwrap_or(self.tokens.len());
+        self.bump();
+        while self.at < next {
+            let starts_line = self.peek().is_some_and(|token| token.first_on_line);
+            let item = (self.is_word("include") && self.is_symbol_at(self.at + 1, "("))
+                || (self.is_word("types") && self.is_symbol_at(self.at + 1, "{"));
+            if starts_line && item {
+                break;
+            }
+            self.bump();
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! Goal files: one graph and a condition.
+//!
+//! Guarantee: every digit-leading or quoted node of the graph is a constant of the goal.
+
+use super::{Finding, NodeNames, Parser};
+use crate::lexer::unquote;
+use crate::{Constant, Goal, Problem};
+
+/// Reads a goal. `None` if it cannot be used.
+pub(crate) fn parse_goal_file(text: &str) -> (Option<Goal>, Vec<Finding>) {
+    let mut parser = Parser::new(text, 0, 0, NodeNames::Goal);
+    let goal = parser.goal();
+    let usable = parser.fatal == 0;
+    (goal.filter(|_| usable), parser.findings)
+}
+
+impl Parser<'_> {
+    fn goal(&mut self) -> Option<Goal> {
+        let pattern = self.graph("`{` and the goal's graph")?;
+        let mut goal = Goal {
+            pattern,
+            ..Goal::default()
+        };
+        if self.is_word("precondition") {
+            self.bump();
+            let opening = self.expect("{", "`{`")?;
+            goal.precondition = self.condition_block(opening);
+        }
+        if self.peek().is_some() {
+            self.expected("`precondition` or the end of the goal", &["precondition"]);
+            return None;
+        }
+        for node in &goal.pattern.nodes {
+            let variable = &node.variable;
+            let constant = if variable.starts_with('"') {
+                Constant::Name(unquote(variable))
+            } else if variable.starts_with(|c: char| c.is_ascii_digit()) {
+                if let Ok(id) = variable.parse() {
+                    Constant::Id(id)
+                } else {
+                    let span = variable.span();
+                    let found = variable.to_string();
+                    let (what, range) = ("a node's id", "a whole number below 2^64");
+                    let problem = Problem::OutOfRange { what, range, found };
+                    self.report(span.start..span.end, problem);
+                    continue;
+                }
+            } else {
+                continue;
+            };
+            goal.constants.insert(variable.to_string(), constant);
+        }
+        Some(goal)
+    }
+}

@@ -1,0 +1,414 @@
+//! Rules and combo rules.
+//!
+//! Guarantee: what is returned was read without an error that changes its meaning.
+
+use super::Parser;
+use super::pattern::SECTIONS;
+use crate::lexer::TokenKind;
+use crate::{
+    Combo, ComboStep, ComboVariable, Effect, Expression, Kind, Literal, Name, Pattern, PatternNode,
+    Problem, Rule,
+};
+use std::ops::Range;
+
+/// Words that may stand before a rule's name.
+pub(super) const MODIFIERS: [&str; 3] = ["dormant", "hierarchical", "strict"];
+/// Words that may stand between a rule's cost and its body.
+const CLAUSES: [&str; 5] = ["success", "activates", "cost", "duration", "agent"];
+
+/// A rule or a combo, or the name of one that is broken.
+#[derive(Debug)]
+pub(super) enum Action {
+    Rule(Box<Rule>),
+    Combo(Combo),
+    Broken(Option<Name>),
+}
+
+#[derive(Debug)]
+struct Header {
+    name: Name,
+    kind: Kind,
+    constant_cost: Expression,
+    cost: Option<Expression>,
+    duration: Option<Expression>,
+    agent: Option<Name>,
+    success: Option<f64>,
+    modifiers: Vec<Name>,
+    activates: Option<Vec<Name>>,
+}
+
+#[derive(Debug, Default)]
+struct Sections {
+    parameters: Option<Vec<PatternNode>>,
+    /// Its conditions, of which there is at most one.
+    precondition: Option<Vec<crate::Condition>>,
+    effect: Option<Vec<Effect>>,
+}
+
+impl Parser<'_> {
+    /// A rule or combo, from its first token to its end or the next rule's beginning.
+    pub(super) fn action(&mut self) -> Action {
+        let fatal = self.fatal;
+        let first = self.at;
+        let next = self
+            .beginnings
+            .partition_point(|&beginning| beginning <= first);
+        self.limit = self
+            .beginnings
+            .get(next)
+            .copied()
+            .unwrap_or(self.tokens.len());
+        let name = self.tokens[first..self.limit]
+            .windows(2)
+            .find(|pair| pair[1].kind == TokenKind::Symbol(":"))
+            .map(|pair| pair[0].range.clone())
+            .map(|range| Name::new(&self.text[range.clone()], self.span(range)));
+        let header = self.header();
+        if header.is_none() {
+            while self.peek().is_some() && !self.is_symbol("{") {
+                self.bump();
+            }
+        }
+        let action = self.body(header);
+        match action {
+            Some(action) if self.fatal == fatal => action,
+            _ => Action::Broken(name),
+        }
+    }
+
+    fn header(&mut self) -> Option<Header> {
+        let mut modifiers = Vec::new();
+        while MODIFIERS.contains(&self.token_text(self.at)) && !self.is_symbol_at(self.at + 1, ":")
+        {
+            let modifier = self.bump_name();
+            if modifiers.contains(&modifier) {
+                self.repeated(
+                    modifier.span().start..modifier.span().end,
+                    format!("`{modifier}`"),
+                );
+            }
+            modifiers.push(modifier);
+        }
+        if self.tokens[..self.limit]
+            .get(self.at + 1)
+            .is_some_and(|t| t.kind == TokenKind::Word)
+        {
+            self.expected(
+                "`dormant`, `hierarchical`, `strict` or a rule's name",
+                &MODIFIERS,
+            );
+            return None;
+        }
+        let name = self.name("a rule's name")?;
+        self.expect(":", "`:` after the rule's name")?;
+        let kind = match self.token_text(self.at) {
+            "active" => Kind::Active,
+            "passive" => Kind::Passive,
+            _ => {
+                self.expected("`active` or `passive`", &["active", "passive"]);
+                return None;
+            }
+        };
+        self.bump();
+        self.expect("(", "`(` and the rule's cost")?;
+        let cost = self.not_negative("the cost")?;
+        self.expect(")", "`)` after the cost")?;
+        let mut header = Header {
+            name,
+            kind,
+            constant_cost: cost,
+            cost: None,
+            duration: None,
+            agent: None,
+            success: None,
+            modifiers,
+            activates: None,
+        };
+        while !self.is_symbol("{") {
+            self.clause(&mut header)?;
+        }
+        Some(header)
+    }
+
+    fn clause(&mut self, header: &mut Header) -> Option<()> {
+        let word = self.token_text(self.at);
+        if !CLAUSES.contains(&word) {
+            self.expected(
+                "`{`, `success`, `activates`, `cost`, `duration` or `agent`",
+                &CLAUSES,
+            );
+            return None;
+        }
+        let range = self.bump();
+        let repeated = match word {
+            "cost" => header
+                .cost
+                .replace(self.bracketed_expression("the cost")?)
+                .is_some(),
+            "duration" => header
+                .duration
+                .replace(self.bracketed_expression("seconds")?)
+                .is_some(),
+            "agent" => {
+                self.expect("(", "`(` and an agent's name")?;
+                let agent = self.name("an agent's name")?;
+                self.expect(")", "`)` after the agent's name")?;
+                header.agent.replace(agent).is_some()
+            }
+            "success" => {
+                self.expect("(", "`(` and a probability")?;
+                let (value, place) = self.number("a probability between 0 and 1")?;
+                if !(0.0..=1.0).contains(&value) {
+                    self.out_of_range(place, "the probability", "between 0 and 1");
+                }
+                self.expect(")", "`)` after the probability")?;
+                header.success.replace(value).is_some()
+            }
+            _ => {
+                self.expect("(", "`(` and the names of rules")?;
+                let mut names = vec![self.name("the name of a rule")?];
+                while self.eat(",") {
+                    names.push(self.name("the name of a rule")?);
+                }
+                self.expect(")", "`,` or `)`")?;
+                header.activates.replace(names).is_some()
+            }
+        };
+        if repeated {
+            self.repeated(range, format!("`{word}`"));
+        }
+        Some(())
+    }
+
+    fn not_negative(&mut self, what: &'static str) -> Option<Expression> {
+        let (value, range) = self.number("a number")?;
+        if value < 0.0 {
+            self.out_of_range(range.clone(), what, "0 or more");
+        }
+        let text = &self.text[range];
+        Some(Expression::Literal(match text.parse::<i64>() {
+            Ok(integer) => Literal::Integer(integer),
+            Err(_) => Literal::Real(value),
+        }))
+    }
+
+    fn out_of_range(&mut self, place: Range<usize>, what: &'static str, range: &'static str) {
+        let found = self.text[place.clone()].to_owned();
+        self.report(place, Problem::OutOfRange { what, range, found });
+    }
+
+    fn repeated(&mut self, range: Range<usize>, what: String) {
+        self.report(range, Problem::Repeated { what });
+    }
+
+    fn body(&mut self, header: Option<Header>) -> Option<Action> {
+        let opening = self.expect("{", "`{` and the rule's body")?;
+        if self
+            .peek()
+            .is_some_and(|token| token.kind == TokenKind::Word)
+            && !self.at_section()
+        {
+            return self.combo_body(header, opening);
+        }
+        let Some(left) = self.graph("`{` and the left side") else {
+            self.skip_braces(1);
+            return None;
+        };
+        let arrow = self.expect("=>", "`=>` between the two sides");
+        let Some(right) = self.graph("`{` and the right side") else {
+            self.skip_braces(1);
+            return None;
+        };
+        let sections = self.sections();
+        if self.expect("}", "`}` at the end of the rule").is_none() {
+            self.skip_braces(1);
+            return None;
+        }
+        arrow?;
+        Some(Action::Rule(Box::new(rule(header?, left, right, sections))))
+    }
+
+    fn sections(&mut self) -> Sections {
+        let mut sections = Sections::default();
+        while let Some(token) = self.peek() {
+            if token.kind != TokenKind::Word {
+                break;
+            }
+            let word = self.token_text(self.at);
+            if !SECTIONS.contains(&word) {
+                self.expected("`parameters`, `precondition`, `effect` or `}`", &SECTIONS);
+                self.bump();
+                if self.eat("{") {
+                    self.skip_braces(1);
+                }
+                continue;
+            }
+            let range = self.bump();
+            let Some(opening) = self.expect("{", "`{`") else {
+                self.skip_line();
+                continue;
+            };
+            let repeated = match word {
+                "parameters" => {
+                    let parameters = self.parameters(opening);
+                    sections.parameters.replace(parameters).is_some()
+                }
+                "precondition" => {
+                    let condition = self.condition_block(opening).into_iter().collect();
+                    sections.precondition.replace(condition).is_some()
+                }
+                _ => sections
+                    .effect
+                    .replace(self.effect_block(opening))
+                    .is_some(),
+            };
+            if repeated {
+                self.repeated(range, format!("`{word}`"));
+            }
+        }
+        sections
+    }
+
+    fn parameters(&mut self, opening: Range<usize>) -> Vec<PatternNode> {
+        let mut parameters = Vec::new();
+        while !self.eat("}") {
+            if self.peek().is_none() || self.is_symbol("{") || self.at_section() {
+                self.report(opening, Problem::Unclosed { opening: '{' });
+                break;
+            }
+            let before = self.at;
+            let parameter = self.parameter();
+            if parameter.is_none() {
+                self.skip_broken_line(before);
+            }
+            parameters.extend(parameter);
+        }
+        parameters
+    }
+
+    fn parameter(&mut self) -> Option<PatternNode> {
+        let variable = self.name("a parameter `variable:type` or `}`")?;
+        self.expect(":", "`:` and the parameter's type")?;
+        let parameter = self.rest_of_node(variable)?;
+        self.eat(",");
+        Some(parameter)
+    }
+
+    fn combo_body(&mut self, header: Option<Header>, opening: Range<usize>) -> Option<Action> {
+        let mut steps = Vec::new();
+        let mut equalities = Vec::new();
+        let mut where_seen = false;
+        while !self.eat("}") {
+            if self.peek().is_none() {
+                self.report(opening, Problem::Unclosed { opening: '{' });
+                return None;
+            }
+            let before = self.at;
+            let read = if self.is_word("where") && self.is_symbol_at(self.at + 1, ":") {
+                self.bump();
+                let range = self.bump();
+                if std::mem::replace(&mut where_seen, true) {
+                    self.repeated(range, "`where:`".to_owned());
+                }
+                Some(())
+            } else if where_seen {
+                self.equality().map(|equality| equalities.push(equality))
+            } else {
+                self.combo_step().map(|step| steps.push(step))
+            };
+            if read.is_none() {
+                self.skip_broken_line(before);
+            }
+        }
+        let header = header?;
+        let plain = header.cost.is_none()
+            && header.duration.is_none()
+            && header.agent.is_none()
+            && header.success.is_none()
+            && header.activates.is_none()
+            && header.modifiers.is_empty();
+        if !plain {
+            let (expected, found) = ("a combo rule without clauses or modifiers", "some");
+            let span = header.name.span();
+            let (expected, found) = (expected.to_owned(), found.to_owned());
+            let problem = Problem::Expected {
+                expected,
+                found,
+                suggestion: None,
+            };
+            self.report(span.start..span.end, problem);
+            return None;
+        }
+        Some(Action::Combo(Combo {
+            name: header.name,
+            cost: header.constant_cost.as_number().unwrap_or_default(),
+            kind: header.kind,
+            steps,
+            equalities,
+            comments: Vec::new(),
+        }))
+    }
+
+    fn combo_step(&mut self) -> Option<ComboStep> {
+        let rule = self.name("a step `rule as alias`, or `where:`")?;
+        if !self.is_word("as") {
+            self.expected("`as` and an alias", &["as"]);
+            return None;
+        }
+        self.bump();
+        let alias = self.name("an alias")?;
+        // A rule may itself be called `optional`: then `as` follows.
+        let optional = self.is_word("optional") && self.token_text(self.at + 1) != "as";
+        if optional {
+            self.bump();
+        }
+        Some(ComboStep {
+            rule,
+            alias,
+            optional,
+        })
+    }
+
+    fn equality(&mut self) -> Option<Vec<ComboVariable>> {
+        let mut variables = vec![self.combo_variable()?];
+        while self.eat("=") {
+            variables.push(self.combo_variable()?);
+        }
+        if variables.len() < 2 {
+            self.expected("`=` and another `alias.variable`", &[]);
+            return None;
+        }
+        Some(variables)
+    }
+
+    fn combo_variable(&mut self) -> Option<ComboVariable> {
+        let alias = self.name("`alias.variable`")?;
+        self.expect(".", "`.` and a variable")?;
+        let variable = self.name("a variable")?;
+        Some(ComboVariable { alias, variable })
+    }
+}
+
+fn rule(header: Header, left: Pattern, right: Pattern, sections: Sections) -> Rule {
+    let has = |modifier: &str| header.modifiers.iter().any(|word| word == modifier);
+    Rule {
+        dormant: has("dormant"),
+        hierarchical: has("hierarchical"),
+        strict: has("strict"),
+        name: header.name,
+        kind: header.kind,
+        cost: header.cost.unwrap_or(header.constant_cost),
+        duration: header.duration,
+        agent: header.agent,
+        success: header.success.unwrap_or(1.0),
+        activates: header.activates.unwrap_or_default(),
+        left,
+        right,
+        parameters: sections.parameters.unwrap_or_default(),
+        precondition: sections
+            .precondition
+            .and_then(|mut condition| condition.pop()),
+        effect: sections.effect.unwrap_or_default(),
+        comments: Vec::new(),
+    }
+}

@@ -1,0 +1,306 @@
+//! The main file, `scenario.toml`, as a whole: the order in which its tables are read, and the
+//! names that they share. Names are unique over all tables, because they become node names.
+
+use super::diagnostic::{Problem, ProblemKind, suggest};
+use super::reader::{Bound, Located, Problems, Table};
+use super::{Activity, Mission, Scenario, TracksFrame};
+use super::{devices, people, space};
+use dsr::Time;
+use jiff::civil::{Date, DateTime, Time as ClockTime};
+use jiff::tz::TimeZone;
+use nalgebra::{Isometry2, Point2, Vector2};
+use std::ops::Range;
+use std::path::PathBuf;
+use toml::de::DeTable;
+
+/// Gives the text of a file beside the main one.
+pub(super) type Read<'a> = &'a dyn Fn(&str) -> std::io::Result<String>;
+
+/// What a name names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Room,
+    Place,
+    Object,
+    Person,
+    Other,
+}
+
+/// Every name of the file, in the order of reading.
+pub(super) struct Names<'a> {
+    text: &'a str,
+    taken: Vec<(String, Kind, Range<usize>)>,
+}
+
+impl Names<'_> {
+    /// The name of the table, noted as taken. A bad one is noted and taken all the same, so that what
+    /// refers to it is not also reported.
+    pub(super) fn take(&mut self, table: &Table<'_>, kind: Kind) -> Option<String> {
+        let name = table.require::<String>("name")?;
+        let value = name.value;
+        let mut letters = value.chars();
+        let good = letters.next().is_some_and(|c| c.is_ascii_alphabetic())
+            && letters.all(|c| c.is_ascii_alphanumeric() || c == '_');
+        if !good {
+            table.problems.add(
+                ProblemKind::BadName {
+                    name: value.clone(),
+                },
+                name.span.clone(),
+            );
+        }
+        if let Some((_, _, first)) = self.taken.iter().find(|(taken, ..)| *taken == value) {
+            let line = self.text[..first.start].matches('\n').count() + 1;
+            let kind = ProblemKind::DuplicateName {
+                name: value.clone(),
+                line,
+            };
+            table.problems.add(kind, name.span.clone());
+        }
+        self.taken.push((value.clone(), kind, name.span));
+        Some(value)
+    }
+
+    /// The name of the table where it gives one, else `default`; noted as taken.
+    pub(super) fn take_or(&mut self, table: &Table<'_>, default: &str) -> String {
+        if table.has("name") {
+            return self.take(table, Kind::Other).unwrap_or_default();
+        }
+        table.allow("name");
+        self.taken
+            .push((default.to_owned(), Kind::Other, table.span.clone()));
+        default.to_owned()
+    }
+
+    /// Whether something of this kind has this name.
+    pub(super) fn is(&self, name: &str, kind: Kind) -> bool {
+        self.taken
+            .iter()
+            .any(|(taken, of, _)| taken == name && *of == kind)
+    }
+
+    /// Notes that there is no `what` called so.
+    pub(super) fn unknown(
+        &self,
+        problems: &Problems,
+        what: &'static str,
+        kinds: &[Kind],
+        name: &Located<String>,
+    ) {
+        let known = self
+            .taken
+            .iter()
+            .filter(|(_, kind, _)| kinds.contains(kind));
+        let help = suggest(&name.value, known.map(|(name, ..)| name.as_str()));
+        let kind = ProblemKind::UnknownName {
+            kind: what,
+            name: name.value.clone(),
+            help,
+        };
+        problems.add(kind, name.span.clone());
+    }
+}
+
+/// A civil time as if it were UTC.
+pub(super) fn time(moment: DateTime) -> Option<Time> {
+    let zoned = moment.to_zoned(TimeZone::UTC).ok()?;
+    i64::try_from(zoned.timestamp().as_nanosecond())
+        .ok()
+        .map(Time::from_nanoseconds)
+}
+
+/// A clock time of the scenario's day.
+pub(super) fn time_of_day(day: Date, clock: ClockTime) -> Option<Time> {
+    time(day.to_datetime(clock))
+}
+
+/// A pose written [x, y, heading].
+pub(super) fn pose(table: &Table<'_>) -> Isometry2<f64> {
+    let [x, y, heading] = table.require("pose").map_or([0.0; 3], |pose| pose.value);
+    Isometry2::new(Vector2::new(x, y), heading)
+}
+
+/// A point written [x, y].
+pub(super) fn point(table: &Table<'_>, key: &'static str) -> Point2<f64> {
+    let [x, y] = table.require(key).map_or([0.0; 2], |point| point.value);
+    Point2::new(x, y)
+}
+
+/// Reads the main file.
+pub(super) fn scenario(text: &str, read: Read<'_>) -> Result<Scenario, Vec<Problem>> {
+    let (document, errors) = DeTable::parse_recoverable(text);
+    if !errors.is_empty() {
+        let syntax = |error: &toml::de::Error| {
+            let message = error.message().to_owned();
+            Problem::new(
+                ProblemKind::Syntax { message },
+                error.span().unwrap_or(0..0),
+            )
+        };
+        return Err(errors.iter().map(syntax).collect());
+    }
+    let problems = Problems::default();
+    let title = "the scenario".to_owned();
+    let table = Table::new(document.get_ref(), 0..0, title, &problems);
+    let scenario = whole(&table, text, read);
+    table.close();
+    let problems = problems.into_vec();
+    if problems.is_empty() {
+        Ok(scenario)
+    } else {
+        Err(problems)
+    }
+}
+
+/// Reads every table. Where a value is wrong a stand-in takes its place, so that the rest is still
+/// checked; the result then never leaves [`scenario`].
+fn whole(table: &Table<'_>, text: &str, read: Read<'_>) -> Scenario {
+    let mut names = Names {
+        text,
+        taken: Vec::new(),
+    };
+    if !table.has("start") {
+        table.missing("start");
+    }
+    let begin = table.moment::<DateTime>("start").unwrap_or_default();
+    let start = time(begin).unwrap_or_default();
+    let name = table
+        .require::<String>("name")
+        .map_or_else(String::new, |name| name.value);
+    let duration = table.required_number("duration", Bound::Positive);
+    let rooms = space::rooms(table, &mut names);
+    let doors = space::doors(table, &names, &rooms);
+    let walls = space::walls(table, &rooms, &doors);
+    let bounds = space::bounds(table, &rooms);
+    let places = space::places(table, &mut names, &rooms);
+    let objects = space::objects(table, &mut names, &rooms);
+    let cameras = devices::cameras(table, &mut names);
+    let robot = devices::robot(table, &mut names);
+    space::check_robot(table, &robot, &rooms, &walls, &objects);
+    let scene = people::Scene {
+        day: begin.date(),
+        rooms: &rooms,
+        places: &places,
+        objects: &objects,
+    };
+    let people = people::people(table, &mut names, &scene);
+    let streams = people::streams(table, &mut names, &rooms);
+    let activities = activities(table, &mut names, begin.date());
+    let missions = missions(table, &mut names, read);
+    let rules = file(table, "rules", "rules.aggl", read);
+    let tracks = tracks(table);
+    Scenario {
+        name,
+        folder: PathBuf::new(),
+        start,
+        duration,
+        bounds,
+        rooms,
+        doors,
+        walls,
+        places,
+        objects,
+        cameras,
+        robot,
+        people,
+        streams,
+        activities,
+        missions,
+        rules,
+        tracks,
+    }
+}
+
+/// The text of a file that the key (or else the default) names.
+fn file(table: &Table<'_>, key: &'static str, default: &str, read: Read<'_>) -> String {
+    let path = table
+        .get::<String>(key)
+        .map_or_else(|| default.to_owned(), |path| path.value);
+    read(&path).unwrap_or_else(|error| {
+        let kind = ProblemKind::UnreadableFile {
+            path,
+            reason: error.to_string(),
+        };
+        table.problems.add(kind, table.span_of(key));
+        String::new()
+    })
+}
+
+fn activities(scenario: &Table<'_>, names: &mut Names<'_>, day: Date) -> Vec<Activity> {
+    let mut activities = Vec::new();
+    for table in scenario.tables("activity") {
+        let name = names.take(&table, Kind::Other);
+        let object = table.require::<String>("object");
+        if let Some(object) = object
+            .as_ref()
+            .filter(|o| !names.is(&o.value, Kind::Object))
+        {
+            names.unknown(table.problems, "object", &[Kind::Object], object);
+        }
+        for key in ["start", "end"] {
+            if !table.has(key) {
+                table.missing(key);
+            }
+        }
+        let clocks = (
+            table.moment::<ClockTime>("start"),
+            table.moment::<ClockTime>("end"),
+        );
+        if let (Some(start), Some(end)) = clocks {
+            if end <= start {
+                table
+                    .problems
+                    .add(ProblemKind::EndsBeforeStart, table.span_of("end"));
+            }
+            let times = time_of_day(day, start).zip(time_of_day(day, end));
+            if let (Some(name), Some(object), Some((start, end))) = (name, object, times) {
+                activities.push(Activity {
+                    name,
+                    object: object.value,
+                    start,
+                    end,
+                });
+            }
+        }
+        table.close();
+    }
+    activities
+}
+
+fn missions(scenario: &Table<'_>, names: &mut Names<'_>, read: Read<'_>) -> Vec<Mission> {
+    let mut missions = Vec::new();
+    for table in scenario.tables("mission") {
+        let name = names.take(&table, Kind::Other);
+        let path = table.require::<String>("goal");
+        let goal = path
+            .as_ref()
+            .map(|path| file(&table, "goal", &path.value, read));
+        let priority = table.get("priority").map_or(0, |priority| priority.value);
+        if let (Some(name), Some(path), Some(goal)) = (name, path, goal) {
+            missions.push(Mission {
+                name,
+                file: path.value,
+                goal,
+                priority,
+            });
+        }
+        table.close();
+    }
+    missions
+}
+
+fn tracks(scenario: &Table<'_>) -> TracksFrame {
+    let Some(table) = scenario.table("tracks") else {
+        return TracksFrame::default();
+    };
+    let [x, y] = table
+        .get("translation")
+        .map_or([0.0; 2], |translation| translation.value);
+    let rotation = table.number("rotation", Bound::Any, 0.0);
+    let tracks = TracksFrame {
+        world_from_recording: Isometry2::new(Vector2::new(x, y), rotation),
+        offset: table.number("offset", Bound::NotNegative, 0.0),
+    };
+    table.close();
+    tracks
+}

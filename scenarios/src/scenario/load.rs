@@ -1,0 +1,40 @@
+//! From a folder to a [`Scenario`]. The only file of the loader that touches the disk.
+
+use super::diagnostic::{Invalid, LoadError};
+use super::{Scenario, file};
+use std::path::Path;
+
+/// The file that makes a folder a scenario.
+pub const MAIN_FILE: &str = "scenario.toml";
+
+impl Scenario {
+    /// Reads the scenario in `folder`: its `scenario.toml`, and the files that it names.
+    ///
+    /// # Errors
+    /// [`LoadError::Unreadable`] without a readable `scenario.toml`, [`LoadError::Invalid`] with
+    /// every problem found in it otherwise.
+    pub fn load(folder: &Path) -> Result<Self, LoadError> {
+        let path = folder.join(MAIN_FILE);
+        let text = std::fs::read_to_string(&path).map_err(|source| LoadError::Unreadable {
+            path: path.clone(),
+            source,
+        })?;
+        let read = |name: &str| std::fs::read_to_string(folder.join(name));
+        let mut scenario = Self::parse(&path.display().to_string(), &text, &read)?;
+        scenario.folder = folder.to_path_buf();
+        Ok(scenario)
+    }
+
+    /// Reads a scenario from the `text` of its main file; `read` gives the text of the files that it
+    /// names, `file` is how diagnostics call the main file.
+    ///
+    /// # Errors
+    /// Every problem found, each with its line and column.
+    pub fn parse(
+        file: &str,
+        text: &str,
+        read: &dyn Fn(&str) -> std::io::Result<String>,
+    ) -> Result<Self, Box<Invalid>> {
+        file::scenario(text, read).map_err(|problems| Box::new(Invalid::new(file, text, problems)))
+    }
+}

@@ -1,0 +1,204 @@
+//! The other process of a multi-process test: `peer ROLE INSTANCE ...`. It says `ready` when it has
+//! joined, and goes on until its standard input ends.
+#![forbid(unsafe_code)]
+#![allow(
+    clippy::print_stdout,
+    reason = "standard output is how it speaks to the test"
+)]
+
+use dsr::{Instance, ReadError, Schema, Session, Snapshot, Store, Time, Transaction, Value};
+use std::error::Error;
+use std::io::Read;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+const PATIENCE: Duration = Duration::from_secs(20);
+
+type Outcome = Result<(), Box<dyn Error>>;
+
+fn main() -> Outcome {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [role, instance, rest @ ..] = arguments.as_slice() else {
+        return Err("usage: peer ROLE INSTANCE".into());
+    };
+    let instance = Instance::new(instance)?;
+    let number = |index: usize| rest.get(index).map_or(Ok(0), |text| text.parse::<u64>());
+    match role.as_str() {
+        "store" => store(&instance),
+        "write-pairs" => write_pairs(&instance),
+        "read-pairs" => read_pairs(&instance),
+        "memory" => memory(&instance, number(0)?),
+        "increment" => increment(&instance, number(0)?),
+        other => Err(format!("no role `{other}`").into()),
+    }
+}
+
+/// True once standard input has ended: the test is done, or gone.
+fn end_of_input() -> Arc<AtomicBool> {
+    let ended = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&ended);
+    std::thread::spawn(move || {
+        let mut rest = Vec::new();
+        // However the input ends, it has.
+        drop(std::io::stdin().read_to_end(&mut rest));
+        flag.store(true, Ordering::Release);
+    });
+    ended
+}
+
+fn store(instance: &Instance) -> Outcome {
+    let mut store = Store::open(instance, Schema::open())?;
+    println!("ready");
+    let ended = end_of_input();
+    while !ended.load(Ordering::Acquire) {
+        store.serve(Duration::from_millis(20))?;
+    }
+    Ok(())
+}
+
+/// How many nodes every transaction of `write-pairs` writes the same number to.
+const PAIRS: u64 = 8;
+
+/// Writes the same number to many nodes, each time in one transaction, flat out.
+fn write_pairs(instance: &Instance) -> Outcome {
+    let mut session = Session::attach(instance, "writer", PATIENCE)?;
+    let mut create = Transaction::new();
+    for i in 0..PAIRS {
+        create.create_node(
+            "pair",
+            &format!("pair{i}"),
+            vec![("n".into(), Value::U64(0))],
+        );
+    }
+    session.commit(&create, Time::default())?;
+    println!("ready");
+    let ended = end_of_input();
+    let mut n = 0;
+    while !ended.load(Ordering::Acquire) {
+        n += 1;
+        let mut transaction = Transaction::new();
+        for i in 0..PAIRS {
+            transaction.set(format!("pair{i}"), "n", Value::U64(n));
+            transaction.set(
+                format!("pair{i}"),
+                "text",
+                "x".repeat((n % 50) as usize).as_str(),
+            );
+        }
+        // A node that comes and goes moves every index.
+        if n % 2 == 0 {
+            transaction.create_node("visitor", "visitor", vec![]);
+            transaction.create_edge("visitor", "sees", "pair0");
+        } else if n > 1 {
+            transaction.delete_node("visitor");
+        }
+        session.commit(&transaction, Time::default())?;
+    }
+    println!("{n}");
+    Ok(())
+}
+
+/// Reads what `write-pairs` writes and counts reads, and reads that saw half a transaction.
+fn read_pairs(instance: &Instance) -> Outcome {
+    let mut session = Session::attach(instance, "reader", PATIENCE)?;
+    println!("ready");
+    let ended = end_of_input();
+    let (mut reads, mut torn, mut outlived) = (0u64, 0u64, 0u64);
+    while !ended.load(Ordering::Acquire) {
+        let snapshot = session.snapshot()?;
+        match pairs_agree(&snapshot) {
+            Ok(true) => reads += 1,
+            Ok(false) => torn += 1,
+            Err(ReadError::SnapshotTooOld { .. }) => outlived += 1,
+            Err(other) => return Err(other.into()),
+        }
+    }
+    println!("{reads} {torn} {outlived}");
+    Ok(())
+}
+
+fn pairs_agree(snapshot: &Snapshot) -> Result<bool, ReadError> {
+    let schema = snapshot.schema();
+    let (Some(pair), Some(n)) = (schema.find_type("pair"), schema.find_attribute("n")) else {
+        return Ok(true);
+    };
+    let mut seen = Vec::new();
+    for node in snapshot.nodes_of_type(pair) {
+        let node = node?;
+        seen.push((
+            node.name()?,
+            node.attribute(n)?.map(|a| (a.value, a.version)),
+        ));
+    }
+    let visitor = snapshot.find_node_by_name("visitor")?;
+    let visits = match &visitor {
+        Some(visitor) => visitor.out_edges().collect::<Result<Vec<_>, _>>()?.len(),
+        None => 0,
+    };
+    let first = seen.first().and_then(|(_, read)| read.clone());
+    let even = matches!(&first, Some((Value::U64(n), _)) if *n > 0 && n % 2 == 0);
+    Ok(seen.len() as u64 == PAIRS
+        && seen.iter().all(|(_, read)| *read == first)
+        && visitor.is_some() == even
+        && visits == usize::from(even))
+}
+
+/// Reads the whole graph and tells the private memory of this process before and after, in KiB.
+fn memory(instance: &Instance, nodes: u64) -> Outcome {
+    let mut session = Session::attach(instance, "reader", PATIENCE)?;
+    // Everything that is allocated once is allocated by reading one node.
+    read_all(&session.snapshot()?, 1)?;
+    let before = private_kilobytes()?;
+    let sum = read_all(&session.snapshot()?, nodes)?;
+    let after = private_kilobytes()?;
+    println!("{before} {after} {sum}");
+    Ok(())
+}
+
+fn read_all(snapshot: &Snapshot, most: u64) -> Result<u64, ReadError> {
+    let mut sum = 0;
+    for node in snapshot.nodes().take(most as usize) {
+        for attribute in node?.attributes()? {
+            sum += attribute.value.as_f64().map_or(0, |x| x as u64);
+        }
+    }
+    Ok(sum)
+}
+
+/// Memory that is this process's own: neither shared with others nor backed by a file.
+fn private_kilobytes() -> Result<u64, Box<dyn Error>> {
+    let text = std::fs::read_to_string("/proc/self/smaps_rollup")?;
+    let field = |name: &str| {
+        let line = text.lines().find(|line| line.starts_with(name))?;
+        line.split_whitespace().nth(1)?.parse::<u64>().ok()
+    };
+    field("Private_Dirty:").ok_or_else(|| "no Private_Dirty in smaps_rollup".into())
+}
+
+/// Adds one to a counter so many times, each time from what it read, retrying on conflict.
+fn increment(instance: &Instance, times: u64) -> Outcome {
+    let mut session = Session::attach(instance, "incrementer", PATIENCE)?;
+    let mut conflicts = 0;
+    for _ in 0..times {
+        loop {
+            let snapshot = session.snapshot()?;
+            let node = snapshot.find_node_by_name("counter")?.ok_or("no counter")?;
+            let old = node.value("n")?;
+            let n = old.as_ref().and_then(Value::as_f64).unwrap_or_default();
+            let mut transaction = Transaction::new().require(dsr::Precondition::AttributeEquals {
+                owner: dsr::Owner::Node("counter".into()),
+                name: "n".into(),
+                value: old,
+            });
+            transaction.set("counter", "n", n + 1.0);
+            match session.commit(&transaction, Time::default()) {
+                Ok(_) => break,
+                Err(dsr::CommitError::Refused(dsr::Refusal::Conflict(_))) => conflicts += 1,
+                Err(other) => return Err(other.into()),
+            }
+        }
+    }
+    println!("{conflicts}");
+    Ok(())
+}
