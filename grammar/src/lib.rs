@@ -7,22 +7,32 @@
 //! function that the caller gives.
 #![forbid(unsafe_code)]
 
+mod apply;
+mod binding;
 mod check;
 mod diagnostic;
+mod goal;
 mod grammar;
 mod lexer;
 mod load;
+mod matching;
 mod parser;
 mod print;
 mod rule;
 mod source;
+#[cfg(test)]
+mod testing;
 
+pub use apply::ApplyError;
+pub use binding::Binding;
 pub use diagnostic::{Diagnostic, Problem, Severity};
+pub use goal::GoalConstants;
 pub use grammar::{
     Combo, ComboStep, ComboVariable, Constant, Goal, Grammar, Include, Property, TypeDeclaration,
     Types,
 };
 pub use load::{Defects, Loader, has_errors, load_grammar, parse_goal, parse_grammar};
+pub use matching::{End, MatchError, Matches, Obstacle, ValueError};
 pub use parser::DEPTH_LIMIT;
 pub use rule::{
     Arithmetic, AttributePath, Comparison, Condition, Effect, Expression, Kind, Literal, Pattern,

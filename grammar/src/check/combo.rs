@@ -4,8 +4,8 @@
 //! pointed out.
 
 use super::Check;
-use crate::diagnostic::nearest;
 use crate::{Combo, ComboVariable, Grammar, Name, PatternNode, Problem, Rule};
+use dsr::suggest;
 
 impl Check<'_> {
     pub(super) fn combo(
@@ -46,7 +46,7 @@ impl Check<'_> {
         part: &ComboVariable,
     ) -> Option<&'g PatternNode> {
         let Some(step) = combo.steps.iter().find(|step| step.alias == part.alias) else {
-            let suggestion = nearest(&part.alias, combo.steps.iter().map(|step| &*step.alias));
+            let suggestion = suggest(&part.alias, combo.steps.iter().map(|step| &*step.alias));
             let name = part.alias.to_string();
             self.report(
                 &part.alias,
@@ -61,7 +61,7 @@ impl Check<'_> {
         let rule = grammar.rule(&step.rule)?;
         let node = variables(rule).find(|node| node.variable == part.variable);
         if node.is_none() {
-            let suggestion = nearest(&part.variable, variables(rule).map(|node| &*node.variable));
+            let suggestion = suggest(&part.variable, variables(rule).map(|node| &*node.variable));
             let (name, scope) = (part.variable.to_string(), "in the rule of this step");
             self.report(
                 &part.variable,

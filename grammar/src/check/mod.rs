@@ -6,9 +6,9 @@
 mod combo;
 mod scope;
 
-use crate::diagnostic::nearest;
 use crate::parser::Finding;
 use crate::{Goal, Grammar, Name, Pattern, PatternNode, Problem, Types};
+use dsr::suggest;
 use scope::Scope;
 
 /// Checks the rules and combos against each other and the types.
@@ -111,7 +111,7 @@ impl Check<'_> {
         if self.types.is_empty() || self.types_missing || self.types.contains(name) {
             return;
         }
-        let suggestion = nearest(name, self.types.names().map(Name::as_str));
+        let suggestion = suggest(name, self.types.names().map(Name::as_str));
         self.report(
             name,
             Problem::UnknownType {
@@ -142,7 +142,7 @@ impl Check<'_> {
             .map(Name::as_str)
             .collect();
         if !names.contains(&name.as_str()) {
-            let suggestion = nearest(name, names);
+            let suggestion = suggest(name, names);
             let name_text = name.to_string();
             self.report(
                 name,
@@ -218,7 +218,7 @@ impl Check<'_> {
             );
             return;
         }
-        let suggestion = nearest(name, scope.names());
+        let suggestion = suggest(name, scope.names());
         let (name_text, scope) = (name.to_string(), scope.words());
         self.report(
             name,

@@ -5,12 +5,12 @@
 
 use super::form::Form;
 use super::{NodeNames, Parser};
-use crate::diagnostic::nearest;
 use crate::lexer::unquote;
 use crate::{
-    Arithmetic, AttributePath, Comparison, Condition, Effect, Expression, Literal, Name,
-    PatternNode, Problem, Span,
+    Arithmetic, Comparison, Condition, Effect, Expression, Literal, Name, PatternNode, Problem,
+    Span,
 };
+use dsr::suggest;
 use std::ops::Range;
 
 const CONDITIONS: [&str; 7] = ["not", "and", "or", "exists", "forall", "when", "eq"];
@@ -353,7 +353,7 @@ impl Parser<'_> {
             let from = self.node_form(from);
             return Some((label, from?, self.node_form(to)?));
         }
-        if let Some(keyword) = nearest(&label, keywords.iter().copied()) {
+        if let Some(keyword) = suggest(&label, keywords.iter().copied()) {
             self.wanted(
                 label.span(),
                 "a link `(label a b)` or an operator",

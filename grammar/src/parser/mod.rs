@@ -13,9 +13,9 @@ mod rule;
 pub(crate) use file::{Item, ParsedFile, parse_file};
 pub(crate) use goal::parse_goal_file;
 
-use crate::diagnostic::nearest;
 use crate::lexer::{Lexed, Token, TokenKind, lex, quote, unquote};
 use crate::{Name, Problem, Span};
+use dsr::suggest;
 use std::ops::Range;
 
 /// How deep formulas and expressions may be nested.
@@ -114,7 +114,7 @@ impl<'a> Parser<'a> {
     fn expected(&mut self, expected: impl Into<String>, candidates: &[&str]) {
         let suggestion = match self.peek() {
             Some(token) if token.kind == TokenKind::Word => {
-                nearest(self.token_text(self.at), candidates.iter().copied())
+                suggest(self.token_text(self.at), candidates.iter().copied())
             }
             _ => None,
         };

@@ -1,0 +1,216 @@
+//! What applying a rule changes.
+//!
+//! Guarantee: a rule is only ever turned into operations at a binding at which its left side and
+//! precondition hold, and the operations make the right side and the effects hold.
+//!
+//! Where the parts of a rule contradict each other: what the right side (or a creating effect)
+//! wants is there afterwards even if an effect unlinks it; a deleted node is gone with whatever
+//! else was said of it.
+
+mod change;
+mod effect;
+
+use crate::matching::{Compiler, Environment, Link, Slot};
+use crate::{Binding, Grammar, MatchError, Obstacle, Rule};
+use change::{Changes, End};
+use dsr::{NodeId, Operation, ReadError, Refusal, RuleEngine, Snapshot};
+
+/// Why a rule cannot be applied.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ApplyError {
+    /// The grammar has no such rule.
+    #[error("no rule `{rule}`{}", did_you_mean(.suggestion.as_deref()))]
+    NoRule {
+        /// As asked for.
+        rule: String,
+        /// What was probably meant.
+        suggestion: Option<String>,
+    },
+    /// The left side or the precondition does not hold.
+    #[error("{0}")]
+    Obstacle(Box<Obstacle>),
+    /// The rule is `strict` and would leave links hanging.
+    #[error(
+        "{variable} ({node}) cannot be deleted: the rule is strict and the node has a link `{label}` that the rule does not delete"
+    )]
+    Dangling {
+        /// The variable of the node to be deleted.
+        variable: String,
+        /// The node's name.
+        node: String,
+        /// The label of a link that would hang.
+        label: String,
+    },
+    /// An assigned expression has no value.
+    #[error("`{expression}` has no value")]
+    Undefined {
+        /// The expression.
+        expression: String,
+    },
+    /// The rule could not be looked at.
+    #[error(transparent)]
+    Match(#[from] MatchError),
+}
+
+impl From<ReadError> for ApplyError {
+    fn from(error: ReadError) -> Self {
+        Self::Match(error.into())
+    }
+}
+
+fn did_you_mean(suggestion: Option<&str>) -> String {
+    suggestion.map_or_else(String::new, |name| format!(", did you mean `{name}`?"))
+}
+
+impl Grammar {
+    /// The operations that rule `name` makes at `binding`, which binds its left side.
+    ///
+    /// They come in this order: links deleted, nodes deleted, nodes retyped, nodes created, links
+    /// created, attributes set. Created nodes are named after their type, with the first number
+    /// that makes the name unique in this snapshot. Conditions and values in effects are read in
+    /// `snapshot`, before any change.
+    ///
+    /// # Errors
+    /// [`ApplyError`]; an [`Obstacle`] in it says what does not hold.
+    pub fn apply(
+        &self,
+        snapshot: &Snapshot,
+        name: &str,
+        binding: &Binding,
+    ) -> Result<Vec<Operation>, ApplyError> {
+        let Some(rule) = self.rule(name) else {
+            let suggestion = dsr::suggest(name, self.rules.iter().map(|rule| &*rule.name));
+            return Err(ApplyError::NoRule {
+                rule: name.to_owned(),
+                suggestion,
+            });
+        };
+        if let Some(obstacle) = self.obstacle(snapshot, rule, binding)? {
+            return Err(ApplyError::Obstacle(Box::new(obstacle)));
+        }
+        let mut compiler = Compiler::new(&self.types, snapshot.schema());
+        let mut environment = Environment::new();
+        for node in rule.bound_nodes() {
+            compiler.declare(&node.variable);
+            let bound = binding.get(&node.variable);
+            environment.push(bound.map_or(Slot::Unbound, Slot::Node));
+        }
+        let mut changes = Changes::new(snapshot);
+        sides(
+            rule,
+            snapshot,
+            &mut compiler,
+            &mut environment,
+            &mut changes,
+        )?;
+        let effects = compiler.effects(&rule.effect)?;
+        environment.resize(compiler.slots(), Slot::Unbound);
+        for effect in &effects {
+            effect.run(snapshot, &mut environment, &mut changes)?;
+        }
+        if rule.strict {
+            no_dangling(rule, snapshot, binding, &changes)?;
+        }
+        Ok(changes.into_operations()?)
+    }
+}
+
+/// What the two sides say.
+fn sides(
+    rule: &Rule,
+    snapshot: &Snapshot,
+    compiler: &mut Compiler<'_>,
+    environment: &mut Environment,
+    changes: &mut Changes<'_>,
+) -> Result<(), ApplyError> {
+    for node in &rule.right.nodes {
+        let Some(left) = rule
+            .bound_nodes()
+            .find(|left| left.variable == node.variable)
+        else {
+            compiler.declare(&node.variable);
+            environment.push(Slot::New(changes.create(&node.type_name)));
+            continue;
+        };
+        if left.type_name != node.type_name {
+            let slot = compiler.slot(&node.variable)?;
+            changes.retype(environment[slot], &node.type_name);
+        }
+    }
+    for node in &rule.left.nodes {
+        if rule.right.node(&node.variable).is_none() {
+            changes.delete(environment[compiler.slot(&node.variable)?]);
+        }
+    }
+    for edge in rule.left.edges.iter().filter(|edge| !edge.negated) {
+        let kept = rule.right.edge(&edge.from, &edge.label, &edge.to);
+        if kept.is_none_or(|kept| kept.negated) {
+            let Link { from, to, .. } = compiler.link(edge)?;
+            changes.unlink(environment[from], &edge.label, environment[to]);
+        }
+    }
+    for edge in &rule.right.edges {
+        let Link { from, to, .. } = compiler.link(edge)?;
+        if edge.negated {
+            changes.unlink(environment[from], &edge.label, environment[to]);
+        } else {
+            changes.link(environment[from], &edge.label, environment[to]);
+        }
+    }
+    snapshot.check()?;
+    Ok(())
+}
+
+/// Refuses a strict rule that deletes a node with links that it does not delete itself.
+fn no_dangling(
+    rule: &Rule,
+    snapshot: &Snapshot,
+    binding: &Binding,
+    changes: &Changes<'_>,
+) -> Result<(), ApplyError> {
+    let schema = snapshot.schema();
+    for id in changes.deleted() {
+        let Some(node) = snapshot.find_node(id)? else {
+            continue;
+        };
+        for key in node.out_edges().chain(node.in_edges()) {
+            let key = key?;
+            let label = schema.label_name(key.label);
+            if changes.unlinks(End::Node(key.from), label, End::Node(key.to)) {
+                continue;
+            }
+            let bound = binding.iter().find(|(_, bound)| *bound == id);
+            return Err(ApplyError::Dangling {
+                variable: bound
+                    .map_or(&rule.name, |(variable, _)| variable)
+                    .to_string(),
+                node: node.name()?,
+                label: label.to_owned(),
+            });
+        }
+    }
+    Ok(())
+}
+
+impl RuleEngine for Grammar {
+    fn expand(
+        &self,
+        snapshot: &Snapshot,
+        rule: &str,
+        binding: &[(String, NodeId)],
+    ) -> Result<Vec<Operation>, Refusal> {
+        let binding = binding
+            .iter()
+            .map(|(variable, node)| (variable.as_str(), *node))
+            .collect();
+        self.apply(snapshot, rule, &binding)
+            .map_err(|error| Refusal::RuleNotApplicable {
+                rule: rule.to_owned(),
+                reason: error.to_string(),
+            })
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,271 @@
+//! Rules applied through the store, on graphs that are written out.
+
+use crate::testing::{CARE, apply, care_centre, describe, graph, read, rule};
+use crate::{ApplyError, Binding, Obstacle};
+use dsr::{Time, Transaction, Value};
+
+#[test]
+fn the_robot_crosses_the_care_centre_and_takes_a_persons_attention() {
+    let grammar = read(CARE);
+    let mut centre = care_centre();
+    let mut step = |rule: &str, binding: &[(&str, &str)]| {
+        apply(&mut centre, &grammar, rule, binding).unwrap();
+    };
+    step(
+        "changeRoom",
+        &[("robot", "shelly"), ("room1", "hall"), ("room2", "kitchen")],
+    );
+    step(
+        "approach",
+        &[("robot", "shelly"), ("room", "kitchen"), ("p", "ana")],
+    );
+    step("takeTheAttention", &[("robot", "shelly"), ("p", "ana")]);
+    let lines = describe(&centre);
+    for there in [
+        "shelly->kitchen(in)",
+        "shelly->ana(is_near)",
+        "ana->shelly(front)",
+    ] {
+        assert!(
+            lines.iter().any(|line| line == there),
+            "{there} in {lines:#?}"
+        );
+    }
+    assert!(!lines.iter().any(|line| line == "shelly->hall(in)"));
+    assert!(
+        lines
+            .iter()
+            .any(|line| line == "hall->kitchen(connected).distance=F64(4.5)")
+    );
+
+    // Leaving the room ends being near.
+    apply(
+        &mut centre,
+        &grammar,
+        "changeRoom",
+        &[("robot", "shelly"), ("room1", "kitchen"), ("room2", "ward")],
+    )
+    .unwrap();
+    assert!(
+        !describe(&centre)
+            .iter()
+            .any(|line| line.contains("is_near"))
+    );
+}
+
+#[test]
+fn a_refusal_names_the_link_that_is_missing() {
+    let grammar = read(CARE);
+    let mut centre = care_centre();
+    let before = describe(&centre);
+    let binding = [("robot", "shelly"), ("room1", "kitchen"), ("room2", "ward")];
+    let refusal = apply(&mut centre, &grammar, "changeRoom", &binding).unwrap_err();
+    assert_eq!(
+        refusal,
+        "rule `changeRoom` is not applicable: robot (shelly) has no link `in` to room1 (kitchen)"
+    );
+    let binding = [("robot", "shelly"), ("room1", "hall")];
+    let refusal = apply(&mut centre, &grammar, "changeRoom", &binding).unwrap_err();
+    assert!(
+        refusal.ends_with("room2 is not bound to a node"),
+        "{refusal}"
+    );
+    let refusal = apply(&mut centre, &grammar, "changeRom", &binding).unwrap_err();
+    assert!(
+        refusal.ends_with("no rule `changeRom`, did you mean `changeRoom`?"),
+        "{refusal}"
+    );
+    assert_eq!(describe(&centre), before);
+}
+
+#[test]
+fn creating_deleting_and_retyping_nodes() {
+    let grammar = rule("{ a:egg b:hen a->b(under) } => { a:chick c:shell a->c(out_of) } ");
+    let mut farm = graph(
+        &[
+            ("egg", "e"),
+            ("hen", "h"),
+            ("farm", "f"),
+            ("shell", "shell_1"),
+        ],
+        &[("e", "under", "h"), ("h", "in", "f"), ("e", "in", "f")],
+    );
+    apply(&mut farm, &grammar, "r", &[("a", "e"), ("b", "h")]).unwrap();
+    assert_eq!(
+        describe(&farm),
+        [
+            "e->f(in)",
+            "e->shell_2(out_of)",
+            "e:chick",
+            "f:farm",
+            "shell_1:shell",
+            "shell_2:shell"
+        ]
+    );
+}
+
+#[test]
+fn a_strict_rule_leaves_no_link_hanging() {
+    let text = "name=t\n===\nstrict r : active(1) { { a:egg b:hen a->b(under) } => { b:hen } }";
+    let grammar = read(text);
+    let mut farm = graph(
+        &[("egg", "e"), ("hen", "h"), ("farm", "f")],
+        &[("e", "under", "h"), ("e", "in", "f")],
+    );
+    let snapshot = farm.snapshot();
+    let id = |name| snapshot.find_node_by_name(name).unwrap().unwrap().id();
+    let binding: Binding = [("a", id("e")), ("b", id("h"))].into_iter().collect();
+    let error = grammar.apply(&snapshot, "r", &binding).unwrap_err();
+    assert_eq!(
+        error,
+        ApplyError::Dangling {
+            variable: "a".into(),
+            node: "e".into(),
+            label: "in".into()
+        }
+    );
+    let mut transaction = Transaction::new();
+    transaction.delete_edge("e", "in", "f");
+    farm.commit(&transaction, "test", Time::default()).unwrap();
+    apply(&mut farm, &grammar, "r", &[("a", "e"), ("b", "h")]).unwrap();
+    assert_eq!(describe(&farm), ["f:farm", "h:hen"]);
+}
+
+#[test]
+fn a_starred_link_on_the_right_creates_nothing_and_clears_what_is_there() {
+    let grammar = rule("{ a:arm } => { a:arm a->a(rest)* }");
+    let mut arms = graph(
+        &[("arm", "left"), ("arm", "right")],
+        &[("left", "rest", "left")],
+    );
+    for arm in ["left", "right"] {
+        apply(&mut arms, &grammar, "r", &[("a", arm)]).unwrap();
+    }
+    assert_eq!(describe(&arms), ["left:arm", "right:arm"]);
+}
+
+#[test]
+fn assignments_read_the_state_before_the_rule_and_keep_the_kind() {
+    let grammar = rule(
+        "{ a:lamp b:lamp } => { a:lamp b:lamp a->b(beside) } effect {
+            (assign a.level b.level) (assign b.level a.level)
+            (assign a.count (+ a.count 1)) (assign e(a, beside, b).gap (/ a.count 2)) }",
+    );
+    let mut lamps = graph(&[("lamp", "x"), ("lamp", "y")], &[]);
+    let mut transaction = Transaction::new();
+    transaction.set("x", "level", 1.5);
+    transaction.set("y", "level", 2.5);
+    transaction.set("x", "count", Value::U64(3));
+    lamps.commit(&transaction, "test", Time::default()).unwrap();
+    apply(&mut lamps, &grammar, "r", &[("a", "x"), ("b", "y")]).unwrap();
+    assert_eq!(
+        describe(&lamps),
+        [
+            "x->y(beside)",
+            "x->y(beside).gap=F64(1.5)",
+            "x.count=U64(4)",
+            "x.level=F64(2.5)",
+            "x:lamp",
+            "y.level=F64(1.5)",
+            "y:lamp"
+        ]
+    );
+}
+
+#[test]
+fn assigning_what_has_no_value_is_refused_whole() {
+    let grammar =
+        rule("{ a:lamp } => { a:lamp a->a(on) } effect { (assign a.level (/ 1 a.missing)) }");
+    let mut lamps = graph(&[("lamp", "x")], &[]);
+    let refusal = apply(&mut lamps, &grammar, "r", &[("a", "x")]).unwrap_err();
+    assert!(
+        refusal.ends_with("`(/ 1 a.missing)` has no value"),
+        "{refusal}"
+    );
+    assert_eq!(describe(&lamps), ["x:lamp"]);
+}
+
+#[test]
+fn quantified_effects_create_delete_and_skip_what_the_condition_excludes() {
+    let grammar = rule(
+        "{ t:table } => { t:table } effect {
+            (forall c:cup
+                (when (on c t) (and (not (on c t)) (create s saucer) (under s c))))
+        }",
+    );
+    let mut kitchen = graph(
+        &[("table", "t"), ("cup", "a"), ("cup", "b"), ("cup", "c")],
+        &[("a", "on", "t"), ("c", "on", "t")],
+    );
+    apply(&mut kitchen, &grammar, "r", &[("t", "t")]).unwrap();
+    assert_eq!(
+        describe(&kitchen),
+        [
+            "a:cup",
+            "b:cup",
+            "c:cup",
+            "saucer_1->a(under)",
+            "saucer_1:saucer",
+            "saucer_2->c(under)",
+            "saucer_2:saucer",
+            "t:table"
+        ]
+    );
+    let grammar =
+        rule("{ t:table } => { t:table } effect { (forall c:cup (delete c)) (retype t desk) }");
+    apply(&mut kitchen, &grammar, "r", &[("t", "t")]).unwrap();
+    assert_eq!(
+        describe(&kitchen),
+        ["saucer_1:saucer", "saucer_2:saucer", "t:desk"]
+    );
+}
+
+#[test]
+fn the_right_side_wins_over_an_effect_that_unlinks_it() {
+    let grammar =
+        rule("{ a:pose } => { a:pose a->a(reach) } effect { (forall p:pose (not (reach p p))) }");
+    let mut poses = graph(&[("pose", "a"), ("pose", "b")], &[("b", "reach", "b")]);
+    apply(&mut poses, &grammar, "r", &[("a", "a")]).unwrap();
+    assert_eq!(describe(&poses), ["a->a(reach)", "a:pose", "b:pose"]);
+}
+
+#[test]
+fn what_a_rule_aims_at_is_recognised_where_somebody_else_brought_it_about() {
+    let grammar = read(CARE);
+    let mut centre = care_centre();
+    let snapshot = centre.snapshot();
+    let id = |name| snapshot.find_node_by_name(name).unwrap().unwrap().id();
+    let binding: Binding = [
+        ("robot", id("shelly")),
+        ("room1", id("hall")),
+        ("room2", id("kitchen")),
+    ]
+    .into_iter()
+    .collect();
+    let rule = grammar.rule("changeRoom").unwrap();
+    let obstacle = grammar.outcome_obstacle(&snapshot, rule, &binding).unwrap();
+    assert!(matches!(obstacle, Some(Obstacle::MissingLink { label, .. }) if label == "in"));
+    let mut transaction = Transaction::new();
+    transaction.create_edge("shelly", "in", "kitchen");
+    centre
+        .commit(&transaction, "test", Time::default())
+        .unwrap();
+    let obstacle = grammar
+        .outcome_obstacle(&centre.snapshot(), rule, &binding)
+        .unwrap();
+    assert!(
+        matches!(obstacle, Some(Obstacle::StarredLink { .. })),
+        "still in the hall"
+    );
+    let mut transaction = Transaction::new();
+    transaction.delete_edge("shelly", "in", "hall");
+    centre
+        .commit(&transaction, "test", Time::default())
+        .unwrap();
+    assert_eq!(
+        grammar
+            .outcome_obstacle(&centre.snapshot(), rule, &binding)
+            .unwrap(),
+        None
+    );
+}

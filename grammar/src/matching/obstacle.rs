@@ -1,0 +1,385 @@
+//! Why a rule cannot be applied at a binding, in words.
+//!
+//! Guarantee: an obstacle is given exactly where the rule does not match.
+
+use super::evaluate::{Environment, for_each_choice, is_there, node};
+use super::program::{Compiler, Slot};
+use super::{MatchError, Problem, conjuncts};
+use crate::{AttributePath, Condition, Expression, Grammar, Name, PatternEdge, PatternNode};
+use dsr::{NodeId, ReadError, Snapshot, Value};
+use std::fmt;
+
+/// A variable and the node that it is bound to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct End {
+    /// The variable.
+    pub variable: String,
+    /// The node.
+    pub node: NodeId,
+    /// The node's name; empty if the graph does not have it.
+    pub name: String,
+}
+
+impl fmt::Display for End {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let variable = &self.variable;
+        match &*self.name {
+            "" => write!(f, "{variable} (node {})", self.node),
+            name if *name == **variable || format!("\"{name}\"") == **variable => {
+                f.write_str(variable)
+            }
+            name => write!(f, "{variable} ({name})"),
+        }
+    }
+}
+
+/// What keeps a rule from being applied, or a goal from holding.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Obstacle {
+    /// A variable is not bound.
+    #[error("{variable} is not bound to a node")]
+    Unbound {
+        /// The variable.
+        variable: String,
+    },
+    /// A node is not in the graph.
+    #[error("{node} is not in the graph")]
+    NoNode {
+        /// The node.
+        node: End,
+    },
+    /// A constant of a goal names a node that is not in the graph.
+    #[error("there is no node {constant}")]
+    NoConstant {
+        /// As the goal names it.
+        constant: String,
+    },
+    /// A node that should be gone is in the graph.
+    #[error("{node} is still there")]
+    StillThere {
+        /// The node.
+        node: End,
+    },
+    /// A node is of a type that does not fit.
+    #[error("{node} is a {found}, not a {expected}")]
+    WrongType {
+        /// The node.
+        node: End,
+        /// Its type.
+        found: String,
+        /// The pattern's type.
+        expected: String,
+    },
+    /// Two variables are bound to one node.
+    #[error("{first} and {second} are the same node")]
+    Shared {
+        /// One of them.
+        first: End,
+        /// The other.
+        second: End,
+    },
+    /// A link of the pattern is not there.
+    #[error("{from} has no link `{label}` to {to}")]
+    MissingLink {
+        /// The node it should leave.
+        from: End,
+        /// The label.
+        label: String,
+        /// The node it should enter.
+        to: End,
+    },
+    /// A starred link of the pattern is there.
+    #[error("{from} has a link `{label}` to {to}, which must not be")]
+    StarredLink {
+        /// The node it leaves.
+        from: End,
+        /// The label.
+        label: String,
+        /// The node it enters.
+        to: End,
+    },
+    /// The condition does not hold.
+    #[error("{reason}")]
+    Condition {
+        /// The innermost formula that explains it.
+        formula: String,
+        /// In words.
+        reason: String,
+    },
+    /// Nothing in the graph fits.
+    #[error("nothing in the graph matches the {of}")]
+    NoMatch {
+        /// Which pattern.
+        of: String,
+    },
+}
+
+/// A variable with its node's name.
+pub(crate) fn end(snapshot: &Snapshot, variable: &str, id: NodeId) -> Result<End, ReadError> {
+    let name = match snapshot.find_node(id)? {
+        Some(node) => node.name()?,
+        None => String::new(),
+    };
+    Ok(End {
+        variable: variable.to_owned(),
+        node: id,
+        name,
+    })
+}
+
+impl Grammar {
+    /// The first thing of a fully bound problem that does not hold.
+    pub(crate) fn explain(
+        &self,
+        snapshot: &Snapshot,
+        mut problem: Problem,
+        nodes: &[&PatternNode],
+        edges: &[PatternEdge],
+        condition: Option<&Condition>,
+    ) -> Result<Option<Obstacle>, MatchError> {
+        if let Some(obstacle) = bound_nodes(snapshot, &problem, nodes)? {
+            return Ok(Some(obstacle));
+        }
+        let environment = &mut problem.environment;
+        for (edge, link) in edges.iter().zip(&problem.links) {
+            if is_there(snapshot, link, environment)? != link.negated {
+                continue;
+            }
+            let (Some(from), Some(to)) = (node(environment, link.from), node(environment, link.to))
+            else {
+                continue;
+            };
+            let from = end(snapshot, &edge.from, from)?;
+            let to = end(snapshot, &edge.to, to)?;
+            let label = edge.label.to_string();
+            return Ok(Some(if link.negated {
+                Obstacle::StarredLink { from, label, to }
+            } else {
+                Obstacle::MissingLink { from, label, to }
+            }));
+        }
+        let conditions = condition.into_iter().flat_map(conjuncts);
+        for (condition, test) in conditions.zip(&problem.tests) {
+            if !test.holds(snapshot, environment)? {
+                let mut compiler = Compiler::new(&self.types, snapshot.schema());
+                for variable in &problem.variables {
+                    compiler.declare(variable);
+                }
+                let mut words = Words {
+                    snapshot,
+                    compiler,
+                    environment,
+                };
+                let (formula, reason) = words.why_not(condition)?;
+                return Ok(Some(Obstacle::Condition { formula, reason }));
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// What is wrong with the bound nodes themselves.
+fn bound_nodes(
+    snapshot: &Snapshot,
+    problem: &Problem,
+    nodes: &[&PatternNode],
+) -> Result<Option<Obstacle>, MatchError> {
+    for (slot, pattern) in nodes.iter().enumerate() {
+        let variable = &pattern.variable;
+        let Some(id) = node(&problem.environment, slot) else {
+            return Ok(Some(Obstacle::Unbound {
+                variable: variable.to_string(),
+            }));
+        };
+        let this = end(snapshot, variable, id)?;
+        let Some(found) = snapshot.find_node(id)? else {
+            return Ok(Some(Obstacle::NoNode { node: this }));
+        };
+        if !problem.domains[slot].contains(found.type_id()) {
+            let (found, expected) = (found.type_name().to_owned(), pattern.type_name.to_string());
+            return Ok(Some(Obstacle::WrongType {
+                node: this,
+                found,
+                expected,
+            }));
+        }
+        for (other, earlier) in nodes.iter().enumerate().take(slot) {
+            if node(&problem.environment, other) == Some(id) {
+                let first = end(snapshot, &earlier.variable, id)?;
+                return Ok(Some(Obstacle::Shared {
+                    first,
+                    second: this,
+                }));
+            }
+        }
+    }
+    Ok(None)
+}
+
+struct Words<'a, 'e> {
+    snapshot: &'a Snapshot,
+    compiler: Compiler<'a>,
+    environment: &'e mut Environment,
+}
+
+impl Words<'_, '_> {
+    fn holds(&mut self, condition: &Condition) -> Result<bool, MatchError> {
+        let test = self.compiler.test(condition)?;
+        if self.environment.len() < self.compiler.slots() {
+            self.environment
+                .resize(self.compiler.slots(), Slot::Unbound);
+        }
+        Ok(test.holds(self.snapshot, self.environment)?)
+    }
+
+    fn end(&self, variable: &Name) -> Result<String, MatchError> {
+        let slot = self.compiler.slot(variable)?;
+        Ok(match node(self.environment, slot) {
+            Some(id) => end(self.snapshot, variable, id)?.to_string(),
+            None => variable.to_string(),
+        })
+    }
+
+    /// The innermost formula that explains why the condition does not hold, and how.
+    fn why_not(&mut self, condition: &Condition) -> Result<(String, String), MatchError> {
+        let formula = condition.to_string();
+        let reason = match condition {
+            Condition::Edge { label, from, to } => {
+                format!(
+                    "{} has no link `{label}` to {}",
+                    self.end(from)?,
+                    self.end(to)?
+                )
+            }
+            Condition::Same(first, second) => {
+                format!("{} is not {}", self.end(first)?, self.end(second)?)
+            }
+            Condition::Compare { left, right, .. } => {
+                let operands = [&**left, &**right];
+                let known = values(self.snapshot, &self.compiler, self.environment, &operands)?;
+                match &*known {
+                    "" => format!("{formula} does not hold"),
+                    known => format!("{formula} does not hold: {known}"),
+                }
+            }
+            Condition::Not(inner) => match &**inner {
+                Condition::Edge { label, from, to } => format!(
+                    "{} has a link `{label}` to {}, which must not be",
+                    self.end(from)?,
+                    self.end(to)?
+                ),
+                Condition::Same(first, second) => {
+                    format!(
+                        "{} and {} are the same node",
+                        self.end(first)?,
+                        self.end(second)?
+                    )
+                }
+                inner => format!("{inner} holds, which must not be"),
+            },
+            Condition::And(all) => {
+                for inner in all {
+                    if !self.holds(inner)? {
+                        return self.why_not(inner);
+                    }
+                }
+                format!("{formula} does not hold")
+            }
+            Condition::Or(_) => format!("nothing of {formula} holds"),
+            Condition::Exists { .. } => format!("{formula} does not hold"),
+            Condition::Forall { variables, body } => {
+                let (first, domains) = self.compiler.quantify(variables);
+                let slots = self.compiler.slots();
+                self.environment
+                    .resize(slots.max(self.environment.len()), Slot::Unbound);
+                let test = self.compiler.test(body)?;
+                let slots = self.compiler.slots();
+                self.environment
+                    .resize(slots.max(self.environment.len()), Slot::Unbound);
+                let snapshot = self.snapshot;
+                let mut fails = |environment: &mut Environment| {
+                    let holds = test.holds(snapshot, environment)?;
+                    Ok::<_, MatchError>((!holds).then_some(()))
+                };
+                let counterexample =
+                    for_each_choice(snapshot, self.environment, first, &domains, &mut fails)?;
+                let explained = match counterexample {
+                    Some(()) => {
+                        let who: Vec<String> = variables
+                            .iter()
+                            .map(|variable| self.end(&variable.variable))
+                            .collect::<Result<_, _>>()?;
+                        let (inner, why) = self.why_not(body)?;
+                        Some((inner, format!("for {}: {why}", who.join(", "))))
+                    }
+                    None => None,
+                };
+                self.compiler.leave(first);
+                match explained {
+                    Some(explained) => return Ok(explained),
+                    None => format!("{formula} does not hold"),
+                }
+            }
+            Condition::When {
+                condition,
+                consequence,
+            } => {
+                let (inner, why) = self.why_not(consequence)?;
+                return Ok((inner, format!("{why}, although {condition}")));
+            }
+        };
+        Ok((formula, reason))
+    }
+}
+
+/// The attributes in expressions and their values: `a.x = 3, b.y is missing`.
+pub(crate) fn values(
+    snapshot: &Snapshot,
+    compiler: &Compiler<'_>,
+    environment: &Environment,
+    expressions: &[&Expression],
+) -> Result<String, MatchError> {
+    let mut paths: Vec<&AttributePath> = Vec::new();
+    for expression in expressions {
+        collect_paths(expression, &mut paths);
+    }
+    let mut known = Vec::new();
+    for path in paths {
+        let term = compiler.term(&Expression::Attribute(path.clone()))?;
+        known.push(match term.value(snapshot, environment)? {
+            Some(value) => format!("{path} = {}", words(&value)),
+            None => format!("{path} is missing"),
+        });
+    }
+    known.dedup();
+    Ok(known.join(", "))
+}
+
+fn collect_paths<'a>(expression: &'a Expression, paths: &mut Vec<&'a AttributePath>) {
+    match expression {
+        Expression::Literal(_) => {}
+        Expression::Attribute(path) => paths.push(path),
+        Expression::Arithmetic { operands, .. } => {
+            for operand in operands {
+                collect_paths(operand, paths);
+            }
+        }
+    }
+}
+
+/// A value as a message shows it.
+pub(crate) fn words(value: &Value) -> String {
+    match value {
+        Value::Bool(value) => value.to_string(),
+        Value::I32(value) => value.to_string(),
+        Value::U32(value) => value.to_string(),
+        Value::I64(value) => value.to_string(),
+        Value::U64(value) => value.to_string(),
+        Value::F32(value) => value.to_string(),
+        Value::F64(value) => value.to_string(),
+        Value::String(text) => format!("{text:?}"),
+        Value::Vector(row) => format!("{row:?}"),
+        other => format!("a {}", other.kind()),
+    }
+}
