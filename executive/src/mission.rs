@@ -6,9 +6,11 @@
 mod adopt;
 pub(crate) mod record;
 mod spec;
+#[cfg(test)]
+mod testing;
 
 pub use record::{MissionStatus, StepStatus};
-pub use spec::{Config, Entry, MissionSpec, Planner};
+pub use spec::{Config, Entry, MissionSpec, Planner, RulePlanner};
 
 use crate::monitor::{Finding, Monitor, Report};
 use adopt::Sought;

@@ -303,4 +303,3 @@ fn observable(rule: &Rule) -> Option<Rule> {
             .all(|edge| seen.left.edges.contains(edge));
     (!same_nodes || !same_edges).then_some(seen)
 }
-

@@ -1,7 +1,7 @@
 //! The executive as a process: takes turns, gives its core the graph, and submits what the core
 //! decided. It guarantees that a turn whose snapshot was overtaken is left out, not guessed.
 
-use crate::mission::{Executive, MissionSpec, Planner};
+use crate::{Executive, MissionSpec, Planner, RulePlanner};
 use dsr::{AttachError, ReadError, Session, Time, TurnError, Turns, Version};
 use grammar::Grammar;
 use thiserror::Error;
@@ -24,7 +24,20 @@ pub enum ProcessError {
     Read(#[from] ReadError),
 }
 
-/// Runs the executive with a planner until it shall end.
+/// Runs the executive until it shall end.
+///
+/// # Errors
+/// [`ProcessError`].
+pub fn run(
+    session: Session,
+    turns: Turns,
+    grammar: Grammar,
+    missions: Vec<MissionSpec>,
+) -> Result<(), ProcessError> {
+    run_with(session, turns, grammar, missions, RulePlanner::default())
+}
+
+/// Runs the executive with a planner of the caller's until it shall end.
 ///
 /// # Errors
 /// [`ProcessError`].

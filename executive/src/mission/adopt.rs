@@ -4,10 +4,9 @@
 
 use super::record::{Mission, Step};
 use super::{Entry, Executive, MissionStatus, Planner, StepStatus, Turn, drop_open};
-use crate::monitor::names;
-use crate::{Options, Outcome, Plan};
-use dsr::{NodeId, ReadError, Time};
-use grammar::Binding;
+use crate::{Outcome, Raised, Status};
+use dsr::{ReadError, Time};
+use std::collections::BTreeSet;
 
 /// What came of seeking a plan.
 pub(super) enum Sought {
@@ -19,30 +18,26 @@ pub(super) enum Sought {
     NotNow,
 }
 
-/// What failed lately: a rule, where, and how often.
-struct Failure {
-    rule: String,
-    binding: Vec<(String, NodeId)>,
-    times: usize,
-    reason: String,
-}
-
 impl<P: Planner> Executive<P> {
     /// Seeks a plan for the mission.
     pub(super) fn seek(&mut self, turn: Turn, mission: &Mission) -> Result<Sought, ReadError> {
         if self.search.not_before.is_some_and(|time| turn.now < time) {
             return Ok(Sought::NotNow);
         }
-        let failures = self.failures(turn, mission)?;
+        let (raised, left_out) = self.failures(turn.now, mission);
         let mut options = self.config.options.clone();
-        options.penalties.extend(failures.iter().map(|failure| {
-            let extra = self.config.penalty * failure.times as f64;
-            (failure.rule.clone(), failure.binding.clone(), extra)
-        }));
-        let sought = match self.outcome(turn, &options)? {
-            Outcome::Solved(plan) => self.steps(turn, &plan, &failures)?,
-            Outcome::Unsolvable { reason } => Sought::Nothing(format!("no plan: {reason}")),
-            Outcome::Limit { reason } => Sought::Nothing(format!("no plan found: {reason}")),
+        options.raised.extend(raised);
+        let outcome = self
+            .planner
+            .plan(&self.grammar, turn.snapshot, turn.goal, &options)?;
+        let sought = match outcome.status {
+            Status::Solved => steps(turn.now, &outcome),
+            Status::Unsolvable | Status::Limit => {
+                let reason = outcome.reason.unwrap_or_default();
+                let mut words = vec![format!("no plan: {reason}")];
+                words.extend(left_out);
+                Sought::Nothing(words.join("; "))
+            }
         };
         let found = matches!(sought, Sought::Plan(_));
         let wait = if found {
@@ -54,96 +49,35 @@ impl<P: Planner> Executive<P> {
         Ok(sought)
     }
 
-    fn outcome(&self, turn: Turn, options: &Options) -> Result<Outcome, ReadError> {
-        self.planner
-            .plan(&self.grammar, turn.snapshot, turn.goal, options)
-    }
-
-    fn failures(&self, turn: Turn, mission: &Mission) -> Result<Vec<Failure>, ReadError> {
-        let mut failures: Vec<Failure> = Vec::new();
-        for step in &mission.steps {
-            let past = turn.now.since(step.since) > self.config.memory;
+    /// What failed lately and shall cost more, and in words what failed too often.
+    fn failures(&self, now: Time, mission: &Mission) -> (Vec<Raised>, Vec<String>) {
+        let mut failures: Vec<(&Step, usize)> = Vec::new();
+        for step in mission.steps.iter().rev() {
+            let past = now.since(step.since) > self.config.memory;
             if step.status != StepStatus::Failed || past {
                 continue;
             }
-            let (binding, missing) = step.nodes(turn.snapshot)?;
-            if !missing.is_empty() {
-                continue;
-            }
-            let binding = pairs(&binding);
-            let known = failures
-                .iter_mut()
-                .find(|failure| failure.rule == step.rule && same(&failure.binding, &binding));
-            match known {
-                Some(failure) => {
-                    failure.times += 1;
-                    failure.reason.clone_from(&step.reason);
-                }
-                None => failures.push(Failure {
-                    rule: step.rule.clone(),
-                    binding: self.ordered(&step.rule, binding),
-                    times: 1,
-                    reason: step.reason.clone(),
-                }),
+            let same = |known: &Step| known.rule == step.rule && known.binding == step.binding;
+            match failures.iter_mut().find(|(known, _)| same(known)) {
+                Some((_, times)) => *times += 1,
+                None => failures.push((step, 1)),
             }
         }
-        Ok(failures)
-    }
-
-    /// A binding in the order of the rule's left side, as the planner has it.
-    fn ordered(&self, rule: &str, mut binding: Vec<(String, NodeId)>) -> Vec<(String, NodeId)> {
-        if let Some(rule) = self.grammar.rule(rule) {
-            let place = |variable: &str| rule.bound_nodes().position(|n| n.variable == *variable);
-            binding.sort_by_key(|(variable, _)| place(variable));
-        }
-        binding
-    }
-
-    fn steps(&self, turn: Turn, plan: &Plan, failures: &[Failure]) -> Result<Sought, ReadError> {
-        if plan.steps.is_empty() {
-            let reason = "no plan: the planner takes the goal to hold, the graph does not";
-            return Ok(Sought::Nothing(reason.to_owned()));
-        }
-        let mut steps = Vec::new();
-        for planned in &plan.steps {
-            let agent = self
-                .grammar
-                .rule(&planned.rule)
-                .and_then(|rule| rule.agent.as_ref());
-            let Some(agent) = agent else {
-                let rule = &planned.rule;
-                let reason = format!("no plan: `{rule}` names no agent that would carry it out");
-                return Ok(Sought::Nothing(reason));
-            };
-            let binding: Binding = planned
-                .binding
-                .iter()
-                .map(|(v, node)| (v.as_str(), *node))
-                .collect();
-            let step = Step {
-                id: None,
-                name: String::new(),
-                index: 0,
-                rule: planned.rule.clone(),
-                agent: agent.to_string(),
-                binding: names(turn.snapshot, &binding)?,
-                status: StepStatus::Pending,
-                since: turn.now,
-                reason: String::new(),
-            };
-            let failed = failures.iter().find(|failure| {
-                failure.rule == planned.rule
-                    && same(&failure.binding, &planned.binding)
-                    && failure.times >= self.config.tries
-            });
-            if let Some(Failure { times, reason, .. }) = failed {
-                let reason =
-                    format!("no plan without {step}, which failed {times} times: {reason}");
-                return Ok(Sought::Nothing(reason));
-            }
-            steps.push(step);
-        }
-        Ok(Sought::Plan(steps))
+        let excluded = |times: usize| times >= self.config.tries;
+        let raised = failures.iter().map(|&(step, times)| Raised {
+            rule: step.rule.clone(),
+            binding: step.binding.clone(),
+            by: if excluded(times) {
+                f64::INFINITY
+            } else {
+                self.config.penalty * times as f64
+            },
+        });
+        let words = failures
+            .iter()
+            .filter(|(_, times)| excluded(*times))
+            .map(|(step, times)| format!("{step} failed {times} times: {}", step.reason));
+        (raised.collect(), words.collect())
     }
 
     /// Puts a new plan into force.
@@ -215,14 +149,40 @@ impl<P: Planner> Executive<P> {
     }
 }
 
-fn pairs(binding: &Binding) -> Vec<(String, NodeId)> {
-    binding
+/// The steps of a plan, for the graph.
+fn steps(now: Time, plan: &Outcome) -> Sought {
+    if plan.steps.is_empty() {
+        let reason = "no plan: the planner takes the goal to hold, the graph does not";
+        return Sought::Nothing(reason.to_owned());
+    }
+    let created: BTreeSet<&String> = plan
+        .steps
         .iter()
-        .map(|(variable, node)| (variable.to_string(), node))
-        .collect()
-}
-
-/// Whether two bindings are the same, in whatever order.
-fn same(one: &[(String, NodeId)], other: &[(String, NodeId)]) -> bool {
-    one.len() == other.len() && one.iter().all(|pair| other.contains(pair))
+        .flat_map(|planned| planned.creates.values())
+        .collect();
+    let mut steps = Vec::new();
+    for planned in &plan.steps {
+        let Some(agent) = &planned.agent else {
+            let rule = &planned.rule;
+            let reason = format!("no plan: `{rule}` names no agent that would carry it out");
+            return Sought::Nothing(reason);
+        };
+        // Nodes that earlier steps create have no name yet; they are chosen at dispatch.
+        let there = planned
+            .binding
+            .iter()
+            .filter(|(_, node)| !created.contains(node));
+        steps.push(Step {
+            id: None,
+            name: String::new(),
+            index: 0,
+            rule: planned.rule.clone(),
+            agent: agent.clone(),
+            binding: there.map(|(v, node)| (v.clone(), node.clone())).collect(),
+            status: StepStatus::Pending,
+            since: now,
+            reason: String::new(),
+        });
+    }
+    Sought::Plan(steps)
 }

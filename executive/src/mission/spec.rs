@@ -1,7 +1,7 @@
 //! What the executive is given and what it tells: missions, settings, a planner, its journal. This
 //! file owns the figures that decide how long it waits and how often it tries.
 
-use crate::{Options, Outcome};
+use crate::{Limits, Options, Outcome};
 use dsr::{ReadError, Snapshot, Time};
 use grammar::{Goal, Grammar};
 
@@ -31,10 +31,37 @@ pub trait Planner {
     ) -> Result<Outcome, ReadError>;
 }
 
+/// The planner of this package, [`crate::plan`], held to a number of states, so that planning ends
+/// without a clock and a run can be repeated to the bit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RulePlanner {
+    /// So many states are expanded at the most.
+    pub expansions: u64,
+}
+
+impl Default for RulePlanner {
+    fn default() -> Self {
+        Self { expansions: 20_000 }
+    }
+}
+
+impl Planner for RulePlanner {
+    fn plan(
+        &self,
+        grammar: &Grammar,
+        snapshot: &Snapshot,
+        goal: &Goal,
+        options: &Options,
+    ) -> Result<Outcome, ReadError> {
+        let mut limits = Limits::new().with_expansions(self.expansions);
+        crate::plan(grammar, snapshot, goal, options, &mut limits)
+    }
+}
+
 /// What the executive can be told once, before it starts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Config {
-    /// How to plan; penalties are added to it.
+    /// How to plan; what failed lately is made dearer besides.
     pub options: Options,
     /// Without a plan it tries again after this, seconds ...
     pub retry: f64,
@@ -47,7 +74,7 @@ pub struct Config {
     pub penalty: f64,
     /// ... for so long, seconds. Within that time ...
     pub memory: f64,
-    /// ... a plan with a step that failed so often is no plan.
+    /// ... a step that failed so often is left out.
     pub tries: usize,
     /// So many steps that are over stay in the graph, per mission.
     pub history: usize,

@@ -5,15 +5,38 @@
 //!    \--- garden ----/
 //! ```
 
-use super::{Exhaustive, RULES, SCHEMA};
-use crate::{Config, Executive, MissionSpec};
-use dsr::{EdgeKey, Graph, Node, NodeId, Schema, Snapshot, Time, Transaction, Value};
+use super::RULES;
+use crate::testing::{centre, read};
+use crate::{Config, Executive, MissionSpec, Options, Outcome, Planner, RulePlanner};
+use dsr::{EdgeKey, Graph, Node, NodeId, ReadError, Snapshot, Time, Transaction, Value};
+use grammar::{Goal, Grammar};
+use std::cell::Cell;
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::rc::Rc;
+
+/// The planner, counting how often it is asked.
+#[derive(Debug, Clone, Default)]
+pub(in crate::mission) struct Counting {
+    planner: RulePlanner,
+    pub(in crate::mission) asked: Rc<Cell<usize>>,
+}
+
+impl Planner for Counting {
+    fn plan(
+        &self,
+        grammar: &Grammar,
+        snapshot: &Snapshot,
+        goal: &Goal,
+        options: &Options,
+    ) -> Result<Outcome, ReadError> {
+        self.asked.set(self.asked.get() + 1);
+        self.planner.plan(grammar, snapshot, goal, options)
+    }
+}
 
 /// How the agent takes its steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Agent {
+pub(in crate::mission) enum Agent {
     /// Begins in one turn, is done in the next.
     Works,
     /// Begins, and never ends.
@@ -25,13 +48,13 @@ pub(crate) enum Agent {
 }
 
 /// The house.
-pub(crate) struct House {
-    pub(crate) graph: Graph,
-    pub(crate) executive: Executive<Exhaustive>,
-    pub(crate) planner: Exhaustive,
-    pub(crate) now: Time,
-    pub(crate) agent: Agent,
-    pub(crate) journal: Vec<String>,
+pub(in crate::mission) struct House {
+    pub(in crate::mission) graph: Graph,
+    pub(in crate::mission) executive: Executive<Counting>,
+    pub(in crate::mission) planner: Counting,
+    pub(in crate::mission) now: Time,
+    pub(in crate::mission) agent: Agent,
+    pub(in crate::mission) journal: Vec<String>,
     missions: Vec<MissionSpec>,
 }
 
@@ -40,9 +63,8 @@ const TURN: f64 = 0.5;
 
 impl House {
     /// A house with missions `(name, goal, priority)`.
-    pub(crate) fn new(missions: &[(&str, &str, i64)]) -> Self {
-        let mut graph = Graph::in_memory(Schema::from_toml("schema.toml", SCHEMA).unwrap());
-        graph.set_rules(Arc::new(rules()));
+    pub(in crate::mission) fn new(missions: &[(&str, &str, i64)]) -> Self {
+        let graph = centre(&read(RULES));
         let missions: Vec<MissionSpec> = missions
             .iter()
             .map(|&(name, goal, priority)| {
@@ -54,10 +76,10 @@ impl House {
                 }
             })
             .collect();
-        let planner = Exhaustive::default();
+        let planner = Counting::default();
         let mut house = Self {
             graph,
-            executive: Executive::new(rules(), missions.clone(), planner.clone()),
+            executive: Executive::new(read(RULES), missions.clone(), planner.clone()),
             planner,
             now: Time::from_seconds(1000.0),
             agent: Agent::Works,
@@ -87,14 +109,14 @@ impl House {
     }
 
     /// Somebody changes the graph.
-    pub(crate) fn change(&mut self, change: impl FnOnce(&mut Transaction)) {
+    pub(in crate::mission) fn change(&mut self, change: impl FnOnce(&mut Transaction)) {
         let mut transaction = Transaction::new();
         change(&mut transaction);
         self.graph.commit(&transaction, "world", self.now).unwrap();
     }
 
     /// The door is closed.
-    pub(crate) fn close(&mut self, a: &str, b: &str) {
+    pub(in crate::mission) fn close(&mut self, a: &str, b: &str) {
         self.change(|transaction| {
             transaction.delete_edge(a, "connected", b);
             transaction.delete_edge(b, "connected", a);
@@ -102,18 +124,18 @@ impl House {
     }
 
     /// The executive is started anew.
-    pub(crate) fn restart(&mut self) {
-        self.executive = Executive::new(rules(), self.missions.clone(), self.planner.clone());
+    pub(in crate::mission) fn restart(&mut self) {
+        self.executive = Executive::new(read(RULES), self.missions.clone(), self.planner.clone());
     }
 
     /// The executive is started anew with other settings.
-    pub(crate) fn configure(&mut self, config: Config) {
+    pub(in crate::mission) fn configure(&mut self, config: Config) {
         let (missions, planner) = (self.missions.clone(), self.planner.clone());
-        self.executive = Executive::with_config(rules(), missions, planner, config);
+        self.executive = Executive::with_config(read(RULES), missions, planner, config);
     }
 
     /// The executive's turn; what it would have written.
-    pub(crate) fn decide(&mut self) -> Vec<Transaction> {
+    pub(in crate::mission) fn decide(&mut self) -> Vec<Transaction> {
         self.now = self.now + TURN;
         let transactions = self
             .executive
@@ -129,7 +151,7 @@ impl House {
     }
 
     /// The executive's turn; how many transactions it made.
-    pub(crate) fn turn(&mut self) -> usize {
+    pub(in crate::mission) fn turn(&mut self) -> usize {
         let transactions = self.decide();
         for transaction in &transactions {
             self.graph
@@ -140,7 +162,7 @@ impl House {
     }
 
     /// So many turns of both.
-    pub(crate) fn run(&mut self, turns: usize) {
+    pub(in crate::mission) fn run(&mut self, turns: usize) {
         for _ in 0..turns {
             self.turn();
             self.act();
@@ -148,7 +170,7 @@ impl House {
     }
 
     /// The agent's turn.
-    pub(crate) fn act(&mut self) {
+    pub(in crate::mission) fn act(&mut self) {
         let snapshot = self.graph.snapshot();
         let steps = snapshot.nodes_of_type(snapshot.schema().find_type("step").unwrap());
         let mut transaction = Transaction::new();
@@ -182,7 +204,7 @@ impl House {
     }
 
     /// The mission as `status, replans: reason`.
-    pub(crate) fn mission(&self, name: &str) -> String {
+    pub(in crate::mission) fn mission(&self, name: &str) -> String {
         let snapshot = self.graph.snapshot();
         let mission = snapshot.find_node_by_name(name).unwrap().unwrap();
         let replans = mission
@@ -195,7 +217,7 @@ impl House {
     }
 
     /// The steps in their order, as `name rule(nodes) status: reason`.
-    pub(crate) fn steps(&self) -> String {
+    pub(in crate::mission) fn steps(&self) -> String {
         let snapshot = self.graph.snapshot();
         let steps = snapshot.nodes_of_type(snapshot.schema().find_type("step").unwrap());
         let mut lines: Vec<(u64, String)> = steps
@@ -219,7 +241,7 @@ impl House {
     }
 
     /// Whether the edge is there.
-    pub(crate) fn holds(&self, from: &str, label: &str, to: &str) -> bool {
+    pub(in crate::mission) fn holds(&self, from: &str, label: &str, to: &str) -> bool {
         let snapshot = self.graph.snapshot();
         let id = |name| find(&snapshot, name);
         let label = snapshot.schema().find_label(label).unwrap();
@@ -236,16 +258,6 @@ impl House {
 
 fn find(snapshot: &Snapshot, name: &str) -> NodeId {
     snapshot.find_node_by_name(name).unwrap().unwrap().id()
-}
-
-fn rules() -> grammar::Grammar {
-    let (grammar, diagnostics) = grammar::parse_grammar(RULES, "rules.aggl");
-    assert!(
-        diagnostics.is_empty(),
-        "{}",
-        grammar::Defects { diagnostics }
-    );
-    grammar
 }
 
 fn text(node: &Node, name: &str) -> String {
