@@ -18,7 +18,8 @@ use std::collections::BTreeMap;
 pub enum Status {
     /// There is a plan.
     Solved,
-    /// It is proved that there is none.
+    /// It is proved that there is none, as far as [`Options::spares`] go; the reason says so where
+    /// they matter.
     Unsolvable,
     /// A limit was met before there was one.
     Limit,
@@ -190,7 +191,9 @@ pub(crate) fn solve(problem: &Problem, options: &Options, limits: &mut Limits<'_
     );
     match search(&ground.task, options.effort, limits) {
         Answer::Solved {
-            actions, optimal, ..
+            actions,
+            optimal,
+            cost,
         } => {
             let steps = actions
                 .iter()
@@ -198,8 +201,10 @@ pub(crate) fn solve(problem: &Problem, options: &Options, limits: &mut Limits<'_
                 .collect();
             Outcome {
                 status: Status::Solved,
-                optimal: optimal && !reached.truncated,
-                cost: Some(from_micro(cost(&ground, &actions))),
+                optimal: optimal
+                    && !reached.truncated
+                    && spares_suffice(problem, options, &reached, &ground, cost),
+                cost: Some(from_micro(plain_cost(&ground, &actions))),
                 steps,
                 expanded: limits.expanded(),
                 reason: None,
@@ -222,10 +227,26 @@ pub(crate) fn solve(problem: &Problem, options: &Options, limits: &mut Limits<'_
 }
 
 /// What a plan costs by its rules alone.
-fn cost(ground: &Ground, actions: &[usize]) -> Micro {
+fn plain_cost(ground: &Ground, actions: &[usize]) -> Micro {
     actions.iter().fold(0, |before, &action| {
         let with_extra = ground.task.cost_after(before, action);
         with_extra - ground.task.actions()[action].cost + ground.costs[action]
+    })
+}
+
+/// Whether a plan that creates more nodes than there are spares would cost at least `cost`.
+fn spares_suffice(
+    problem: &Problem,
+    options: &Options,
+    reached: &Reached,
+    ground: &Ground,
+    cost: Micro,
+) -> bool {
+    let more = options.spares as u64 + 1;
+    let mut actions = ground.task.actions().iter().zip(&ground.actions);
+    actions.all(|(action, &index)| {
+        let operator = &problem.program.operators[reached.instances[index].operator];
+        !operator.creates() || action.cost.saturating_mul(more) >= cost
     })
 }
 

@@ -235,6 +235,11 @@ impl<'a> Builder<'a> {
         let mut gone = Vec::new();
         let reached = self.reached;
         let mut visit = |guards: &[Guard<'a>], primitive: Primitive<'a>| {
+            if let Primitive::Unlink(link) = primitive
+                && !reached.facts.has_link(link)
+            {
+                return;
+            }
             let parts: Vec<Formula> = guards
                 .iter()
                 .map(|guard| match guard {

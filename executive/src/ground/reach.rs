@@ -273,30 +273,32 @@ impl<'a> Reaching<'a> {
         let mut environment = instance.objects.clone();
         let (program, initial, facts) = (self.program, self.initial, &self.reached.facts);
         let mut visit = |guards: &[Guard<'_>], primitive: Primitive<'a>| {
-            let never = guards.iter().any(|guard| match guard {
+            let new = match &primitive {
+                Primitive::Link(link) => !facts.has_link(*link),
+                Primitive::Create(object, exact) | Primitive::Retype(object, exact) => {
+                    !facts.types(*object).contains(exact)
+                }
+                Primitive::Assign(place, ..) => program.assigned[usize::from(place.attribute())],
+                Primitive::Unlink(_) | Primitive::Delete(_) => false,
+            };
+            let never = |guard: &Guard<'_>| match guard {
                 Guard::Test(test, environment) => {
                     always(test, program, initial, &mut environment.clone()) == Some(false)
                 }
                 Guard::OfType(..) => false,
-            });
-            if never {
+            };
+            if !new || guards.iter().any(never) {
                 return;
             }
             match primitive {
-                Primitive::Link(link) if !facts.has_link(link) => {
-                    arrivals.push(Arrival::Link(link));
-                }
-                Primitive::Create(object, exact) | Primitive::Retype(object, exact)
-                    if !facts.types(object).contains(&exact) =>
-                {
+                Primitive::Link(link) => arrivals.push(Arrival::Link(link)),
+                Primitive::Create(object, exact) | Primitive::Retype(object, exact) => {
                     arrivals.push(Arrival::Type(object, exact));
                 }
-                Primitive::Assign(place, term, environment)
-                    if program.assigned[usize::from(place.attribute())] =>
-                {
+                Primitive::Assign(place, term, environment) => {
                     assigned.push((place, term, environment));
                 }
-                _ => {}
+                Primitive::Unlink(_) | Primitive::Delete(_) => {}
             }
         };
         let changes = &operator.changes;

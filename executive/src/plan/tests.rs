@@ -206,6 +206,24 @@ fn new_nodes_can_be_planned_with_and_sleeping_rules_woken() {
 }
 
 #[test]
+fn optimal_is_claimed_only_where_more_new_nodes_could_not_be_cheaper() {
+    let (_, graph) = hen();
+    let wanted = "{ e:egg b:box e->b(inside) }";
+    let lay = |cost: u8| {
+        let sides = "{ h:hen b:box h->b(on) } => { h:hen b:box h->b(on) e:egg e->b(inside) }";
+        let walk = "{ h:hen b:box c:box h->b(on) } => { h:hen b:box c:box h->c(on) }";
+        let rules = format!("lay : active({cost}) {{ {sides} }}\nhop : active(1) {{ {walk} }}");
+        read(&format!("name=hen\n===\n{rules}\n"))
+    };
+    let planned = outcome(&lay(2), &graph, wanted, &Options::default());
+    assert_eq!((planned.cost, planned.optimal), (Some(2.0), true));
+    // Where laying costs nothing, many eggs could make a cheaper way to the green box.
+    let wanted = "{ e:egg \"green\":box e->\"green\"(inside) }";
+    let planned = outcome(&lay(0), &graph, wanted, &Options::default());
+    assert_eq!((planned.cost, planned.optimal), (Some(1.0), false));
+}
+
+#[test]
 fn values_that_rules_assign_are_planned_with() {
     let (grammar, graph) = hen();
     let wanted =
