@@ -4,6 +4,7 @@
 
 use super::facts::Facts;
 use super::program::{Environment, Link, Object, Operator, UNBOUND};
+use crate::search::{Limits, StopReason};
 
 /// One step of a join.
 #[derive(Debug, Clone, Copy)]
@@ -18,6 +19,45 @@ enum Step {
     Scan(Link),
     /// Bind a variable that no link leads to.
     Each(usize),
+}
+
+/// Bindings as they are found, within limits: a rule whose variables no link joins may have more of
+/// them than there is time or memory.
+#[derive(Debug)]
+pub(crate) struct Found<'l, 'c> {
+    pub(crate) bindings: Vec<Environment>,
+    /// Bytes that are in use besides.
+    bytes: usize,
+    tried: u32,
+    limits: &'l mut Limits<'c>,
+    pub(crate) stopped: Option<StopReason>,
+}
+
+impl<'l, 'c> Found<'l, 'c> {
+    pub(crate) fn new(bytes: usize, limits: &'l mut Limits<'c>) -> Self {
+        Self {
+            bindings: Vec::new(),
+            bytes,
+            tried: 0,
+            limits,
+            stopped: None,
+        }
+    }
+
+    fn is_stopped(&mut self) -> bool {
+        self.tried += 1;
+        if self.tried.is_multiple_of(1024) && self.stopped.is_none() {
+            let slots = self.bindings.first().map_or(0, Vec::len);
+            let bytes = self.bytes + self.bindings.len() * bytes_of_binding(slots);
+            self.stopped = self.limits.check(bytes).err();
+        }
+        self.stopped.is_some()
+    }
+}
+
+/// About what a binding takes.
+pub(crate) const fn bytes_of_binding(slots: usize) -> usize {
+    size_of::<Environment>() + 16 + slots * size_of::<Object>()
 }
 
 /// In which order to bind the variables of an operator, from every fact that may come last.
@@ -49,7 +89,7 @@ impl Plan {
         facts: &Facts,
         index: usize,
         new: Link,
-        found: &mut Vec<Environment>,
+        found: &mut Found<'_, '_>,
     ) {
         let link = operator.links[index];
         let mut environment = operator.environment();
@@ -73,7 +113,7 @@ impl Plan {
         facts: &Facts,
         variable: usize,
         object: Object,
-        found: &mut Vec<Environment>,
+        found: &mut Found<'_, '_>,
     ) {
         let mut environment = operator.environment();
         if bind(operator, facts, &mut environment, variable as u32, object) {
@@ -146,10 +186,13 @@ fn extend(
     facts: &Facts,
     steps: &[Step],
     environment: &mut Environment,
-    found: &mut Vec<Environment>,
+    found: &mut Found<'_, '_>,
 ) {
+    if found.is_stopped() {
+        return;
+    }
     let Some((&step, rest)) = steps.split_first() else {
-        found.push(environment.clone());
+        found.bindings.push(environment.clone());
         return;
     };
     let mut choose = |environment: &mut Environment, slots: &[u32], objects: &[Object]| {

@@ -4,7 +4,7 @@
 
 use super::effects::{Guard, Primitive, each_primitive};
 use super::facts::Facts;
-use super::join::Plan;
+use super::join::{Found, Plan, bytes_of_binding};
 use super::program::{Change, Environment, Link, Object, Operator, Place, Program, Term};
 use super::truth::always;
 use super::value::evaluate;
@@ -62,6 +62,8 @@ struct Reaching<'a> {
     /// Operators of which later facts may change what they bring about.
     open_ended: Vec<bool>,
     arrivals: VecDeque<Arrival>,
+    /// About how many bytes the bindings take.
+    bytes: usize,
     reached: Reached,
 }
 
@@ -69,7 +71,7 @@ struct Reaching<'a> {
 /// application, in the order of its created variables.
 ///
 /// # Errors
-/// [`StopReason::Time`].
+/// [`StopReason::Time`], [`StopReason::Memory`].
 pub(crate) fn reach(
     program: &Program,
     goal: &Operator,
@@ -102,6 +104,7 @@ pub(crate) fn reach(
         seen: FxHashSet::default(),
         open_ended: program.operators.iter().map(open_ended).collect(),
         arrivals: VecDeque::new(),
+        bytes: 0,
         initial: &world.facts,
         program,
         goal,
@@ -152,14 +155,9 @@ impl<'a> Reaching<'a> {
                 self.bound(number, vec![environment]);
             }
         }
-        let mut count = 0usize;
         loop {
             while let Some(arrival) = self.arrivals.pop_front() {
-                if count.is_multiple_of(256) {
-                    limits.check_time()?;
-                }
-                count += 1;
-                self.arrive(arrival);
+                self.arrive(arrival, limits)?;
             }
             // Effects on every object of a type, and assigned values, depend on what was reached
             // after their rule was.
@@ -176,34 +174,37 @@ impl<'a> Reaching<'a> {
         }
     }
 
-    fn arrive(&mut self, arrival: Arrival) {
-        let mut found = Vec::new();
-        match arrival {
+    fn arrive(&mut self, arrival: Arrival, limits: &mut Limits<'_>) -> Result<(), StopReason> {
+        let waiting = match arrival {
             Arrival::Type(object, exact) => {
-                if !self.reached.facts.add_type(object, exact) {
-                    return;
-                }
-                for at in 0..self.by_type[usize::from(exact)].len() {
-                    let (number, variable) = self.by_type[usize::from(exact)][at];
-                    let operator = self.operator(number);
-                    let (plan, facts) = (&self.plans[number], &self.reached.facts);
-                    plan.with_variable(operator, facts, variable, object, &mut found);
-                    self.bound(number, std::mem::take(&mut found));
-                }
+                let new = self.reached.facts.add_type(object, exact);
+                new.then(|| self.by_type[usize::from(exact)].clone())
             }
             Arrival::Link(link) => {
-                if !self.reached.facts.add_link(link) {
-                    return;
-                }
-                for at in 0..self.by_label[usize::from(link.label)].len() {
-                    let (number, index) = self.by_label[usize::from(link.label)][at];
-                    let operator = self.operator(number);
-                    let (plan, facts) = (&self.plans[number], &self.reached.facts);
-                    plan.with_link(operator, facts, index, link, &mut found);
-                    self.bound(number, std::mem::take(&mut found));
-                }
+                let new = self.reached.facts.add_link(link);
+                new.then(|| self.by_label[usize::from(link.label)].clone())
             }
+        };
+        for (number, index) in waiting.unwrap_or_default() {
+            limits.check(self.bytes)?;
+            let operator = self.operator(number);
+            let (plan, facts) = (&self.plans[number], &self.reached.facts);
+            let mut found = Found::new(self.bytes, limits);
+            match arrival {
+                Arrival::Type(object, _) => {
+                    plan.with_variable(operator, facts, index, object, &mut found);
+                }
+                Arrival::Link(link) => plan.with_link(operator, facts, index, link, &mut found),
+            }
+            let Found {
+                bindings, stopped, ..
+            } = found;
+            if let Some(reason) = stopped {
+                return Err(reason);
+            }
+            self.bound(number, bindings);
         }
+        Ok(())
     }
 
     /// Takes new bindings of an operator or the goal.
@@ -214,6 +215,8 @@ impl<'a> Reaching<'a> {
                 continue;
             }
             self.seen.insert((number, environment.clone()));
+            // Seen, and kept as an instance with what it changes.
+            self.bytes += 4 * bytes_of_binding(environment.len());
             let impossible = |environment: &mut Environment| {
                 let forbidden = operator.absent.iter().any(|link| {
                     self.initial.has_link(link.at(environment))

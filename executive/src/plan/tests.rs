@@ -131,6 +131,37 @@ fn at_a_limit_it_says_how_far_it_came() {
 }
 
 #[test]
+fn a_rule_with_too_many_bindings_meets_the_limit_while_they_are_counted() {
+    let grammar = read(
+        "name=odd\n===\n
+        meet : active(1) { { a:room b:room c:room d:room } => { a:room b:room c:room d:room a->b(connected) } }\n",
+    );
+    let mut graph = centre(&grammar);
+    let names: Vec<String> = (0..300).map(|i| format!("r{i}")).collect();
+    let rooms: Vec<(&str, &str)> = names.iter().map(|n| ("room", n.as_str())).collect();
+    add(&mut graph, &rooms, &[]);
+    let goal = goal(&grammar, "{ a:room b:room a->b(connected) }");
+    let snapshot = graph.snapshot();
+    let options = Options::default();
+    let mut limits = Limits::new().with_bytes(10_000_000);
+    let stopped = plan(&grammar, &snapshot, &goal, &options, &mut limits).unwrap();
+    expect![[r"
+        Limit
+        stopped while grounding: the memory allowed is used up"]]
+    .assert_eq(&written(&stopped));
+    let mut asked = 0;
+    let mut limits = Limits::new().with_clock(1.0, || {
+        asked += 1;
+        f64::from(asked) * 0.01
+    });
+    let stopped = plan(&grammar, &snapshot, &goal, &options, &mut limits).unwrap();
+    expect![[r"
+        Limit
+        stopped while grounding: the time allowed is over"]]
+    .assert_eq(&written(&stopped));
+}
+
+#[test]
 fn twenty_five_rooms_are_crossed_with_few_expansions() {
     let grammar = read(CARE);
     let mut graph = centre(&grammar);
