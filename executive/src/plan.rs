@@ -2,7 +2,9 @@
 //! owns what the outcome says; it guarantees that each step of a plan is applicable after those
 //! before it, and that the goal holds at the end.
 
-use crate::ground::{Environment, Ground, Instance, Problem, ProblemError, Reached, build};
+use crate::ground::{
+    Environment, Ground, Instance, Operator, Problem, ProblemError, Reached, build,
+};
 use crate::search::{Answer, Effort, Limits, Reachability, search};
 use crate::task::{Literal, Micro, from_micro};
 use dsr::{ReadError, Snapshot};
@@ -16,7 +18,8 @@ use std::collections::BTreeMap;
 pub enum Status {
     /// There is a plan.
     Solved,
-    /// It is proved that there is none.
+    /// It is proved that there is none, as far as [`Options::spares`] go; the reason says so where
+    /// they matter.
     Unsolvable,
     /// A limit was met before there was one.
     Limit,
@@ -188,7 +191,9 @@ pub(crate) fn solve(problem: &Problem, options: &Options, limits: &mut Limits<'_
     );
     match search(&ground.task, options.effort, limits) {
         Answer::Solved {
-            actions, optimal, ..
+            actions,
+            optimal,
+            cost,
         } => {
             let steps = actions
                 .iter()
@@ -196,8 +201,10 @@ pub(crate) fn solve(problem: &Problem, options: &Options, limits: &mut Limits<'_
                 .collect();
             Outcome {
                 status: Status::Solved,
-                optimal: optimal && !reached.truncated,
-                cost: Some(from_micro(cost(&ground, &actions))),
+                optimal: optimal
+                    && !reached.truncated
+                    && spares_suffice(problem, options, &reached, &ground, cost),
+                cost: Some(from_micro(plain_cost(&ground, &actions))),
                 steps,
                 expanded: limits.expanded(),
                 reason: None,
@@ -220,10 +227,26 @@ pub(crate) fn solve(problem: &Problem, options: &Options, limits: &mut Limits<'_
 }
 
 /// What a plan costs by its rules alone.
-fn cost(ground: &Ground, actions: &[usize]) -> Micro {
+fn plain_cost(ground: &Ground, actions: &[usize]) -> Micro {
     actions.iter().fold(0, |before, &action| {
         let with_extra = ground.task.cost_after(before, action);
         with_extra - ground.task.actions()[action].cost + ground.costs[action]
+    })
+}
+
+/// Whether a plan that creates more nodes than there are spares would cost at least `cost`.
+fn spares_suffice(
+    problem: &Problem,
+    options: &Options,
+    reached: &Reached,
+    ground: &Ground,
+    cost: Micro,
+) -> bool {
+    let more = options.spares as u64 + 1;
+    let mut actions = ground.task.actions().iter().zip(&ground.actions);
+    actions.all(|(action, &index)| {
+        let operator = &problem.program.operators[reached.instances[index].operator];
+        !operator.creates() || action.cost.saturating_mul(more) >= cost
     })
 }
 
@@ -266,7 +289,7 @@ fn why_unsolvable(
     if options.raised.iter().any(|raised| raised.by.is_infinite()) {
         reasons.push("steps that failed lately were left out".to_owned());
     }
-    if problem.program.operators.iter().any(|o| o.creates()) {
+    if problem.program.operators.iter().any(Operator::creates) {
         reasons.push(format!(
             "each rule was given {} new nodes at most",
             options.spares

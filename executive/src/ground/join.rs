@@ -4,6 +4,7 @@
 
 use super::facts::Facts;
 use super::program::{Environment, Link, Object, Operator, UNBOUND};
+use crate::search::{Limits, StopReason};
 
 /// One step of a join.
 #[derive(Debug, Clone, Copy)]
@@ -20,12 +21,50 @@ enum Step {
     Each(usize),
 }
 
+/// Bindings as they are found, within limits: a rule whose variables no link joins may have more of
+/// them than there is time or memory.
+#[derive(Debug)]
+pub(crate) struct Found<'l, 'c> {
+    pub(crate) bindings: Vec<Environment>,
+    /// Bytes that are in use besides.
+    bytes: usize,
+    tried: u32,
+    limits: &'l mut Limits<'c>,
+    pub(crate) stopped: Option<StopReason>,
+}
+
+impl<'l, 'c> Found<'l, 'c> {
+    pub(crate) fn new(bytes: usize, limits: &'l mut Limits<'c>) -> Self {
+        Self {
+            bindings: Vec::new(),
+            bytes,
+            tried: 0,
+            limits,
+            stopped: None,
+        }
+    }
+
+    fn is_stopped(&mut self) -> bool {
+        self.tried += 1;
+        if self.tried.is_multiple_of(1024) && self.stopped.is_none() {
+            let slots = self.bindings.first().map_or(0, Vec::len);
+            let bytes = self.bytes + self.bindings.len() * bytes_of_binding(slots);
+            self.stopped = self.limits.check(bytes).err();
+        }
+        self.stopped.is_some()
+    }
+}
+
+/// About what a binding takes.
+pub(crate) const fn bytes_of_binding(slots: usize) -> usize {
+    size_of::<Environment>() + 16 + slots * size_of::<Object>()
+}
+
 /// In which order to bind the variables of an operator, from every fact that may come last.
 #[derive(Debug, Clone)]
 pub(crate) struct Plan {
     by_link: Vec<Vec<Step>>,
     by_variable: Vec<Vec<Step>>,
-    from_nothing: Vec<Step>,
 }
 
 impl Plan {
@@ -40,18 +79,17 @@ impl Plan {
                 .map(|(index, link)| order(&[link.from as usize, link.to as usize], Some(index)))
                 .collect(),
             by_variable: (0..operator.bound).map(|v| order(&[v], None)).collect(),
-            from_nothing: order(&[], None),
         }
     }
 
     /// The bindings that have `new` as the link number `index` of the operator.
-    pub(crate) fn from_link(
+    pub(crate) fn with_link(
         &self,
         operator: &Operator,
         facts: &Facts,
         index: usize,
         new: Link,
-        found: &mut Vec<Environment>,
+        found: &mut Found<'_, '_>,
     ) {
         let link = operator.links[index];
         let mut environment = operator.environment();
@@ -69,30 +107,18 @@ impl Plan {
     }
 
     /// The bindings that have `object` for the variable.
-    pub(crate) fn from_variable(
+    pub(crate) fn with_variable(
         &self,
         operator: &Operator,
         facts: &Facts,
         variable: usize,
         object: Object,
-        found: &mut Vec<Environment>,
+        found: &mut Found<'_, '_>,
     ) {
         let mut environment = operator.environment();
         if bind(operator, facts, &mut environment, variable as u32, object) {
             let steps = &self.by_variable[variable];
             extend(operator, facts, steps, &mut environment, found);
-        }
-    }
-
-    /// All bindings.
-    pub(crate) fn all(&self, operator: &Operator, facts: &Facts, found: &mut Vec<Environment>) {
-        let mut environment = operator.environment();
-        let fixed = operator.fixed.iter();
-        if fixed
-            .clone()
-            .all(|&(slot, object)| facts.is_of(object, &operator.variables[slot].types))
-        {
-            extend(operator, facts, &self.from_nothing, &mut environment, found);
         }
     }
 }
@@ -160,10 +186,13 @@ fn extend(
     facts: &Facts,
     steps: &[Step],
     environment: &mut Environment,
-    found: &mut Vec<Environment>,
+    found: &mut Found<'_, '_>,
 ) {
+    if found.is_stopped() {
+        return;
+    }
     let Some((&step, rest)) = steps.split_first() else {
-        found.push(environment.clone());
+        found.bindings.push(environment.clone());
         return;
     };
     let mut choose = |environment: &mut Environment, slots: &[u32], objects: &[Object]| {

@@ -4,8 +4,8 @@
 
 use super::effects::{Guard, Primitive, each_primitive};
 use super::facts::Facts;
-use super::join::Plan;
-use super::program::{Environment, Link, Object, Operator, Place, Program, Term};
+use super::join::{Found, Plan, bytes_of_binding};
+use super::program::{Change, Environment, Link, Object, Operator, Place, Program, Term};
 use super::truth::always;
 use super::value::evaluate;
 use super::world::World;
@@ -59,7 +59,11 @@ struct Reaching<'a> {
     seen: FxHashSet<(usize, Environment)>,
     /// Bindings of operators that still sleep.
     sleeping: Vec<Vec<Environment>>,
+    /// Operators of which later facts may change what they bring about.
+    open_ended: Vec<bool>,
     arrivals: VecDeque<Arrival>,
+    /// About how many bytes the bindings take.
+    bytes: usize,
     reached: Reached,
 }
 
@@ -67,7 +71,7 @@ struct Reaching<'a> {
 /// application, in the order of its created variables.
 ///
 /// # Errors
-/// [`StopReason::Time`].
+/// [`StopReason::Time`], [`StopReason::Memory`].
 pub(crate) fn reach(
     program: &Program,
     goal: &Operator,
@@ -98,7 +102,9 @@ pub(crate) fn reach(
         plans: operators().map(|o| Plan::new(o, &world.facts)).collect(),
         sleeping: vec![Vec::new(); program.operators.len()],
         seen: FxHashSet::default(),
+        open_ended: program.operators.iter().map(open_ended).collect(),
         arrivals: VecDeque::new(),
+        bytes: 0,
         initial: &world.facts,
         program,
         goal,
@@ -129,6 +135,14 @@ pub(crate) fn reach(
     Ok(reaching.reached)
 }
 
+fn open_ended(operator: &Operator) -> bool {
+    let mut found = false;
+    operator.each_change(&mut |change| {
+        found |= matches!(change, Change::Forall(_) | Change::Assign(..));
+    });
+    found
+}
+
 impl<'a> Reaching<'a> {
     fn operator(&self, number: usize) -> &'a Operator {
         self.program.operators.get(number).unwrap_or(self.goal)
@@ -141,21 +155,18 @@ impl<'a> Reaching<'a> {
                 self.bound(number, vec![environment]);
             }
         }
-        let mut count = 0usize;
         loop {
             while let Some(arrival) = self.arrivals.pop_front() {
-                if count.is_multiple_of(256) {
-                    limits.check_time()?;
-                }
-                count += 1;
-                self.arrive(arrival);
+                self.arrive(arrival, limits)?;
             }
             // Effects on every object of a type, and assigned values, depend on what was reached
             // after their rule was.
             let mut grew = false;
             for index in 0..self.reached.instances.len() {
-                let instance = self.reached.instances[index].clone();
-                grew |= self.effects(&instance);
+                if self.open_ended[self.reached.instances[index].operator] {
+                    let instance = self.reached.instances[index].clone();
+                    grew |= self.effects(&instance);
+                }
             }
             if !grew && self.arrivals.is_empty() {
                 return Ok(());
@@ -163,34 +174,37 @@ impl<'a> Reaching<'a> {
         }
     }
 
-    fn arrive(&mut self, arrival: Arrival) {
-        let mut found = Vec::new();
-        match arrival {
+    fn arrive(&mut self, arrival: Arrival, limits: &mut Limits<'_>) -> Result<(), StopReason> {
+        let waiting = match arrival {
             Arrival::Type(object, exact) => {
-                if !self.reached.facts.add_type(object, exact) {
-                    return;
-                }
-                for at in 0..self.by_type[usize::from(exact)].len() {
-                    let (number, variable) = self.by_type[usize::from(exact)][at];
-                    let operator = self.operator(number);
-                    let (plan, facts) = (&self.plans[number], &self.reached.facts);
-                    plan.from_variable(operator, facts, variable, object, &mut found);
-                    self.bound(number, std::mem::take(&mut found));
-                }
+                let new = self.reached.facts.add_type(object, exact);
+                new.then(|| self.by_type[usize::from(exact)].clone())
             }
             Arrival::Link(link) => {
-                if !self.reached.facts.add_link(link) {
-                    return;
-                }
-                for at in 0..self.by_label[usize::from(link.label)].len() {
-                    let (number, index) = self.by_label[usize::from(link.label)][at];
-                    let operator = self.operator(number);
-                    let (plan, facts) = (&self.plans[number], &self.reached.facts);
-                    plan.from_link(operator, facts, index, link, &mut found);
-                    self.bound(number, std::mem::take(&mut found));
-                }
+                let new = self.reached.facts.add_link(link);
+                new.then(|| self.by_label[usize::from(link.label)].clone())
             }
+        };
+        for (number, index) in waiting.unwrap_or_default() {
+            limits.check(self.bytes)?;
+            let operator = self.operator(number);
+            let (plan, facts) = (&self.plans[number], &self.reached.facts);
+            let mut found = Found::new(self.bytes, limits);
+            match arrival {
+                Arrival::Type(object, _) => {
+                    plan.with_variable(operator, facts, index, object, &mut found);
+                }
+                Arrival::Link(link) => plan.with_link(operator, facts, index, link, &mut found),
+            }
+            let Found {
+                bindings, stopped, ..
+            } = found;
+            if let Some(reason) = stopped {
+                return Err(reason);
+            }
+            self.bound(number, bindings);
         }
+        Ok(())
     }
 
     /// Takes new bindings of an operator or the goal.
@@ -201,6 +215,8 @@ impl<'a> Reaching<'a> {
                 continue;
             }
             self.seen.insert((number, environment.clone()));
+            // Seen, and kept as an instance with what it changes.
+            self.bytes += 4 * bytes_of_binding(environment.len());
             let impossible = |environment: &mut Environment| {
                 let forbidden = operator.absent.iter().any(|link| {
                     self.initial.has_link(link.at(environment))
@@ -260,30 +276,32 @@ impl<'a> Reaching<'a> {
         let mut environment = instance.objects.clone();
         let (program, initial, facts) = (self.program, self.initial, &self.reached.facts);
         let mut visit = |guards: &[Guard<'_>], primitive: Primitive<'a>| {
-            let never = guards.iter().any(|guard| match guard {
+            let new = match &primitive {
+                Primitive::Link(link) => !facts.has_link(*link),
+                Primitive::Create(object, exact) | Primitive::Retype(object, exact) => {
+                    !facts.types(*object).contains(exact)
+                }
+                Primitive::Assign(place, ..) => program.assigned[usize::from(place.attribute())],
+                Primitive::Unlink(_) | Primitive::Delete(_) => false,
+            };
+            let never = |guard: &Guard<'_>| match guard {
                 Guard::Test(test, environment) => {
                     always(test, program, initial, &mut environment.clone()) == Some(false)
                 }
                 Guard::OfType(..) => false,
-            });
-            if never {
+            };
+            if !new || guards.iter().any(never) {
                 return;
             }
             match primitive {
-                Primitive::Link(link) if !facts.has_link(link) => {
-                    arrivals.push(Arrival::Link(link));
-                }
-                Primitive::Create(object, exact) | Primitive::Retype(object, exact)
-                    if !facts.types(object).contains(&exact) =>
-                {
+                Primitive::Link(link) => arrivals.push(Arrival::Link(link)),
+                Primitive::Create(object, exact) | Primitive::Retype(object, exact) => {
                     arrivals.push(Arrival::Type(object, exact));
                 }
-                Primitive::Assign(place, term, environment)
-                    if program.assigned[usize::from(place.attribute())] =>
-                {
+                Primitive::Assign(place, term, environment) => {
                     assigned.push((place, term, environment));
                 }
-                _ => {}
+                Primitive::Unlink(_) | Primitive::Delete(_) => {}
             }
         };
         let changes = &operator.changes;

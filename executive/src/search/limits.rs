@@ -113,6 +113,17 @@ impl<'a> Limits<'a> {
         Ok(())
     }
 
+    /// Whether work that holds `bytes` may go on.
+    ///
+    /// # Errors
+    /// [`StopReason::Memory`], [`StopReason::Time`].
+    pub(crate) fn check(&mut self, bytes: usize) -> Result<(), StopReason> {
+        if bytes > self.bytes {
+            return Err(StopReason::Memory);
+        }
+        self.check_time()
+    }
+
     /// Counts one expansion of a search that holds `bytes`.
     ///
     /// # Errors
