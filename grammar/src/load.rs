@@ -145,7 +145,8 @@ impl miette::Diagnostic for Defects {
     }
 }
 
-fn diagnostics(findings: Vec<Finding>, files: &[SourceFile]) -> Vec<Diagnostic> {
+/// Findings with the files that they lie in.
+pub(crate) fn diagnostics(findings: Vec<Finding>, files: &[SourceFile]) -> Vec<Diagnostic> {
     let diagnostic = |finding: Finding| {
         let file = files.get(finding.span.file as usize)?.clone();
         let Finding {

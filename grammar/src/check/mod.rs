@@ -4,6 +4,7 @@
 //! declared types (where types are declared at all).
 
 mod combo;
+mod schema;
 mod scope;
 
 use crate::parser::{Action, Broken, Finding};

@@ -88,11 +88,7 @@ impl Check<'_> {
                 self.variable(first, scope);
                 self.variable(second, scope);
             }
-            Condition::Compare {
-                operator,
-                left,
-                right,
-            } => {
+            Condition::Compare { left, right, .. } => {
                 self.expression(left, scope);
                 self.expression(right, scope);
             }
@@ -205,7 +201,7 @@ impl Check<'_> {
         match expression {
             Expression::Literal(_) => {}
             Expression::Attribute(path) => self.path(path, scope),
-            Expression::Arithmetic { operator, operands } => {
+            Expression::Arithmetic { operands, .. } => {
                 for operand in operands {
                     self.expression(operand, scope);
                 }

@@ -353,7 +353,7 @@ fn goals_name_nodes_by_id_by_name_or_leave_them_open() {
         g.aggt:1:15: error: no variable `4` in this goal (did you mean `1`?)
         g.aggt:1:21: error: a node's id must be a whole number below 2^64, not 99999999999999999999
         g.aggt:1:49: error: expected `precondition` or the end of the goal, found `x`"#]]
-        .assert_eq(&error.unwrap_err().to_string());
+    .assert_eq(&error.unwrap_err().to_string());
     let error = parse_goal("{ 1:robott 1->4(in) }", "g.aggt", &types);
     expect![[r#"
         g.aggt:1:5: error: no type `robott` (did you mean `robot`?)
