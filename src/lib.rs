@@ -1,6 +1,97 @@
-//! The `cortex` program.
+//! The `cortex` program: its verbs are thin shells around the packages of the workspace.
+//!
+//! Exit codes: 0 done, 1 the answer is no, 2 bad input, 3 something is broken.
 #![forbid(unsafe_code)]
+
+mod cli;
+mod commands;
+mod conduct;
+mod progress;
+mod supervise;
+
+use clap::Parser;
+use miette::Diagnostic;
+use std::process::ExitCode;
+use thiserror::Error;
+
+/// How a verb ends, where nothing is broken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Answer {
+    Yes,
+    No,
+}
+
+/// A report that says that the user's input is at fault, not the program.
+#[derive(Debug, Error, Diagnostic)]
+#[error("{0}")]
+#[diagnostic(code(cortex::input))]
+struct BadInput(String, #[help] Option<String>);
+
 /// Runs the program.
-pub fn main() -> std::process::ExitCode {
-    std::process::ExitCode::SUCCESS
+pub fn main() -> ExitCode {
+    let cli = match cli::Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Printing help can only fail where nobody reads it.
+            drop(error.print());
+            return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
+        }
+    };
+    tracing_subscriber::fmt()
+        .with_env_filter(
+            tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into()),
+        )
+        .with_writer(std::io::stderr)
+        .with_ansi(false)
+        .init();
+    match commands::perform(cli.verb) {
+        Ok(Answer::Yes) => ExitCode::SUCCESS,
+        Ok(Answer::No) => ExitCode::from(1),
+        Err(failure) => {
+            let code = failure.code();
+            print_error(&failure.into_report());
+            ExitCode::from(code)
+        }
+    }
+}
+
+#[allow(clippy::print_stderr, reason = "this is where errors reach the user")]
+fn print_error(report: &miette::Report) {
+    eprintln!("{report:?}");
+}
+
+/// Why a verb did not end with an answer.
+#[derive(Debug)]
+enum Failure {
+    /// The input is at fault.
+    Input(miette::Report),
+    /// The program or the machine is.
+    Internal(miette::Report),
+}
+
+impl Failure {
+    fn code(&self) -> u8 {
+        match self {
+            Self::Input(_) => 2,
+            Self::Internal(_) => 3,
+        }
+    }
+
+    fn into_report(self) -> miette::Report {
+        match self {
+            Self::Input(report) | Self::Internal(report) => report,
+        }
+    }
+
+    fn input(message: impl std::fmt::Display) -> Self {
+        Self::Input(BadInput(message.to_string(), None).into())
+    }
+
+    fn input_with_help(message: impl std::fmt::Display, help: impl Into<String>) -> Self {
+        Self::Input(BadInput(message.to_string(), Some(help.into())).into())
+    }
+
+    fn internal(error: impl std::fmt::Display) -> Self {
+        Self::Internal(miette::Report::msg(error.to_string()))
+    }
 }

@@ -2,5 +2,10 @@
 #![forbid(unsafe_code)]
 
 pub mod grid;
+pub mod human_observer;
 pub mod messages;
+pub mod navigation;
+pub mod object_recognition;
+pub mod perception;
+pub mod process;
 pub mod social_mapping;

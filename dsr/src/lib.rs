@@ -11,6 +11,7 @@ mod arena;
 mod change;
 mod graph;
 mod ids;
+pub mod json;
 mod process;
 mod schema;
 #[allow(
@@ -25,7 +26,7 @@ mod value;
 
 pub use arena::ReadError;
 pub use change::{Change, EdgeChange, Filter, NodeChange, RuleApplication, Touch};
-pub use graph::{Graph, Image, Limits, RuleEngine};
+pub use graph::{Graph, Image, Limits, RuleEngine, decode_image};
 pub use ids::{AttributeId, EdgeKey, Epoch, LabelId, NodeId, TypeId, Version, WriterId};
 pub use process::{Pace, TurnError, Turns, done_line, turn_line};
 pub use schema::{

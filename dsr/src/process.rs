@@ -9,13 +9,17 @@
 
 use crate::{ClockError, Session, Tick, Time};
 use std::io::{BufRead, Write};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, channel};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::time::Duration;
 use thiserror::Error;
 
 /// Who decides when a process takes its turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pace {
+    /// The world's clock, with nobody on standard input: the process ends by a signal.
+    Alone,
     /// The world's clock; a process that is slow misses ticks.
     Free,
     /// The supervisor, one process after the other, so that a run can be repeated to the bit.
@@ -58,17 +62,21 @@ fn parse_turn(line: &str) -> Option<Tick> {
 pub struct Turns {
     pace: Pace,
     lines: Receiver<String>,
+    stop: Arc<AtomicBool>,
     taking: Option<u64>,
 }
 
 impl Turns {
-    /// Says `ready`, and takes turns at that pace from now on. To be called once, after everything
-    /// that a turn needs is open.
+    /// Says `ready`, and takes turns at that pace from now on, until `stop` is set (by a signal,
+    /// say). To be called once, after everything that a turn needs is open.
     ///
     /// # Errors
     /// [`TurnError::Supervisor`].
-    pub fn begin(pace: Pace) -> Result<Self, TurnError> {
+    pub fn begin(pace: Pace, stop: Arc<AtomicBool>) -> Result<Self, TurnError> {
         let (send, lines) = channel();
+        if pace == Pace::Alone {
+            return Ok(Self { pace, lines, stop, taking: None });
+        }
         std::thread::Builder::new().name("lifeline".to_owned()).spawn(move || {
             for line in std::io::stdin().lock().lines() {
                 let Ok(line) = line else { return };
@@ -78,7 +86,7 @@ impl Turns {
             }
         })?;
         say("ready\n")?;
-        Ok(Self { pace, lines, taking: None })
+        Ok(Self { pace, lines, stop, taking: None })
     }
 
     /// Waits for the next turn; `None` when the process shall end.
@@ -87,10 +95,9 @@ impl Turns {
     /// [`TurnError`].
     pub fn next(&mut self, session: &mut Session) -> Result<Option<Tick>, TurnError> {
         match self.pace {
-            Pace::Free => loop {
-                match self.lines.try_recv() {
-                    Err(TryRecvError::Disconnected) => return Ok(None),
-                    Ok(_) | Err(TryRecvError::Empty) => {}
+            Pace::Alone | Pace::Free => loop {
+                if self.ended() {
+                    return Ok(None);
                 }
                 if let Some(tick) = session.wait_for_tick(Duration::from_millis(50))? {
                     return Ok(Some(tick));
@@ -108,11 +115,25 @@ impl Turns {
         }
     }
 
-    /// Waits up to `patience` for the lifeline's end: whether it has come.
-    pub fn ended_within(&mut self, patience: Duration) -> bool {
-        match self.lines.recv_timeout(patience) {
-            Err(RecvTimeoutError::Disconnected) => true,
-            Ok(_) | Err(RecvTimeoutError::Timeout) => false,
+    /// Whether a supervisor gives the turns.
+    pub fn in_lockstep(&self) -> bool {
+        self.pace == Pace::Lockstep
+    }
+
+    /// Whether the process shall end; for processes that take no turns.
+    pub fn ended(&mut self) -> bool {
+        if self.stop.load(Ordering::Acquire) {
+            return true;
+        }
+        if self.pace == Pace::Alone {
+            return false;
+        }
+        loop {
+            match self.lines.try_recv() {
+                Ok(_) => {}
+                Err(TryRecvError::Empty) => return false,
+                Err(TryRecvError::Disconnected) => return true,
+            }
         }
     }
 }

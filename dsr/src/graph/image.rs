@@ -91,10 +91,24 @@ impl Image {
         })
     }
 
+    /// The image as bytes, which [`decode_image`] reads.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        // Encoding to memory cannot fail for these types.
+        postcard::to_stdvec(self).unwrap_or_default()
+    }
+
     /// The version that this is the image of.
     pub fn version(&self) -> Version {
         self.version
     }
+}
+
+/// Reads what [`Image::to_bytes`] wrote.
+///
+/// # Errors
+/// [`Refusal::Malformed`].
+pub fn decode_image(bytes: &[u8]) -> Result<Image, Refusal> {
+    postcard::from_bytes(bytes).map_err(|error| Refusal::Malformed(error.to_string()))
 }
 
 impl Graph {

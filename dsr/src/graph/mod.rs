@@ -5,7 +5,7 @@
 mod apply;
 mod image;
 
-pub use image::Image;
+pub use image::{Image, decode_image};
 
 use crate::arena::allocator::{Allocator, Full, Growth, HeapGrowth};
 use crate::arena::{Address, Arena, Root, record};
@@ -317,4 +317,4 @@ impl Graph {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

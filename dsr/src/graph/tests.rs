@@ -158,7 +158,7 @@ impl Model {
     }
 }
 
-fn value() -> impl Strategy<Value = Value> {
+pub(crate) fn value() -> impl Strategy<Value = Value> {
     prop_oneof![
         any::<bool>().prop_map(Value::Bool),
         any::<i32>().prop_map(Value::I32),

@@ -358,6 +358,29 @@ impl Session {
         Err(CommitError::NoAnswer)
     }
 
+    /// As [`Self::commit`], for agents that decide anew from the next snapshot: does nothing for an
+    /// empty transaction, logs a refusal or a lost store, and goes on.
+    ///
+    /// # Errors
+    /// [`AttachError`] where there is nothing to go on with.
+    pub fn submit(
+        &mut self,
+        transaction: &Transaction,
+        time: Time,
+    ) -> Result<Option<Commit>, AttachError> {
+        if transaction.is_empty() {
+            return Ok(None);
+        }
+        match self.commit(transaction, time) {
+            Ok(commit) => Ok(Some(commit)),
+            Err(CommitError::Attach(error @ AttachError::Instance(_))) => Err(error),
+            Err(error) => {
+                tracing::warn!(%time, "{error}");
+                Ok(None)
+            }
+        }
+    }
+
     /// Follows the commits that pass `filter`, from now on.
     ///
     /// # Errors

@@ -264,31 +264,9 @@ impl Diagnostic for Problem {
 /// "did you mean ...?" where something near exists, else what there is.
 pub(crate) fn suggest<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let known: Vec<&str> = known.into_iter().collect();
-    let nearest = known
-        .iter()
-        .map(|name| (distance(wrong, name), *name))
-        .min();
-    match nearest {
-        Some((edits, name)) if edits <= 1 + wrong.chars().count() / 4 => {
-            format!("did you mean `{name}`?")
-        }
-        Some(_) => format!("known are: {}", known.join(", ")),
-        None => String::new(),
+    match dsr::suggest(wrong, known.iter().copied()) {
+        Some(name) => format!("did you mean `{name}`?"),
+        None if known.is_empty() => String::new(),
+        None => format!("known are: {}", known.join(", ")),
     }
-}
-
-/// Levenshtein distance in characters.
-fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, from) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, to) in b.iter().enumerate() {
-            let replaced = diagonal + usize::from(from != *to);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[b.len()]
 }

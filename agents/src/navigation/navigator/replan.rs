@@ -1,0 +1,173 @@
+//! When the navigator plans a path, and to where. This file guarantees that it plans at most twice a
+//! second, and that a way is given up only for one that is clearly better or because it is closed.
+
+use super::course::{Care, Course, Hindrance};
+use super::{Navigator, View};
+use crate::grid::CostGrid;
+use crate::navigation::band::Band;
+use crate::navigation::people::{Person, Presence};
+use crate::navigation::planner::price;
+use crate::navigation::target::{Destination, Target, Task, has_moved, places_to_talk};
+use nalgebra::Point2;
+
+impl Navigator {
+    /// Plans where there is a reason to.
+    pub(super) fn keep_planned(
+        &mut self,
+        course: &mut Course,
+        grid: &CostGrid,
+        view: &View,
+    ) -> Result<(), Hindrance> {
+        let person = match &course.task.target {
+            Target::Person { name, .. } => {
+                let found = view
+                    .inputs
+                    .people
+                    .iter()
+                    .find(|person| person.name == *name);
+                Some(found.ok_or(Hindrance::NoPerson)?)
+            }
+            _ => None,
+        };
+        let age = course
+            .planned
+            .map_or(f64::INFINITY, |planned| view.now.since(planned));
+        if age < 0.5 {
+            return course.hindrance.map_or(Ok(()), Err);
+        }
+        let moved = person.is_some_and(|person| has_moved(course.person, person.position()));
+        let now = price(grid, self.band.points());
+        course.price = course.price.min(now.cost);
+        let dearer = now.blocked || now.cost > 1.3 * course.price + 1.5;
+        if self.band.points().is_empty() || moved || dearer || course.hindrance.is_some() {
+            return self.plan(course, grid, view, person, Care::Map);
+        }
+        let walkers = view.inputs.people.iter().any(Person::is_walking);
+        if view.inputs.social && walkers && age >= self.config.review {
+            self.review(course, grid, view, person);
+        }
+        Ok(())
+    }
+
+    /// Takes a new way only where it is clearly cheaper than the one the robot is on.
+    fn review(
+        &mut self,
+        course: &mut Course,
+        grid: &CostGrid,
+        view: &View,
+        person: Option<&Person>,
+    ) {
+        let old = std::mem::take(&mut self.band);
+        let kept = course.clone();
+        let found = self.plan(course, grid, view, person, Care::Map);
+        let new = self.planner.price(self.band.points());
+        let before = self.planner.price(old.points());
+        if found.is_err() || !before.blocked && new.cost > 0.85 * before.cost {
+            self.band = old;
+            *course = Course {
+                planned: Some(view.now),
+                ..kept
+            };
+        }
+    }
+
+    /// Plans a path and lays a band along it.
+    pub(super) fn plan(
+        &mut self,
+        course: &mut Course,
+        grid: &CostGrid,
+        view: &View,
+        person: Option<&Person>,
+        care: Care,
+    ) -> Result<(), Hindrance> {
+        self.plans += 1;
+        course.planned = Some(view.now);
+        let robot = view.robot.position;
+        self.planner.load(grid);
+        if view.inputs.social {
+            self.planner
+                .expect(view.inputs.people, robot, view.inputs.limits.max_speed);
+        }
+        if care == Care::Laser {
+            let standing: Vec<Presence> = view
+                .inputs
+                .people
+                .iter()
+                .filter(|person| view.inputs.social && !person.is_walking())
+                .map(|person| person.predicted(0.0))
+                .collect();
+            let reach = (view.inputs.limits.radius, 4.0);
+            self.planner.block(&self.obstacles, &standing, robot, reach);
+        }
+        let found = self.line(course, grid, robot, person);
+        course.hindrance = found.as_ref().err().copied();
+        let (destination, line) = found?;
+        course.hindered = None;
+        let line_end = line[line.len() - 1];
+        course.destination = Some(Destination {
+            point: line_end,
+            ..destination
+        });
+        course.person = person.map_or(robot, Person::position);
+        course.at_place = false;
+        self.band = Band::new(&line, &self.config.gains);
+        self.relax(view, 20);
+        course.price = price(grid, self.band.points()).cost;
+        let length = self.band.length();
+        if length > course.shortest + 0.5 {
+            course.shortest = length;
+        }
+        Ok(())
+    }
+
+    /// The way to the first of the task's places that can be reached.
+    fn line(
+        &mut self,
+        course: &Course,
+        grid: &CostGrid,
+        robot: Point2<f64>,
+        person: Option<&Person>,
+    ) -> Result<(Destination, Vec<Point2<f64>>), Hindrance> {
+        let single = |point, heading| vec![(Destination { point, heading }, 1.0)];
+        let places = match (&course.task.target, person) {
+            (Target::Region { entry, .. }, _) => {
+                let region = course.region.as_ref();
+                let place = region.and_then(|region| region.place_inside(*entry, grid));
+                let point = place.ok_or(Hindrance::RegionBlocked)?;
+                vec![(
+                    Destination {
+                        point,
+                        heading: None,
+                    },
+                    0.3,
+                )]
+            }
+            (Target::Point(point), _) => single(*point, None),
+            (Target::Pose(pose), _) => {
+                single(pose.translation.vector.into(), Some(pose.rotation.angle()))
+            }
+            (Target::Person { .. }, None) => return Err(Hindrance::NoPerson),
+            (Target::Person { distance, .. }, Some(person)) => {
+                places_to_talk(person, *distance, robot)
+                    .map(|place| (place, 0.15))
+                    .collect()
+            }
+        };
+        let mut first_error = None;
+        for (place, tolerance) in places {
+            match self.planner.line_to(robot, &place, tolerance) {
+                Ok(line) => return Ok((place, line)),
+                Err(error) => first_error = first_error.or(Some(error)),
+            }
+        }
+        Err(first_error.map_or(Hindrance::RegionBlocked, Hindrance::NoPath))
+    }
+}
+
+/// Whom a task leads to, where they are known.
+pub(super) fn person_of<'a>(task: &Task, people: &'a [Person]) -> Option<&'a Person> {
+    match &task.target {
+        Target::Person { name, .. } => people.iter().find(|person| person.name == *name),
+        _ => None,
+    }
+}

@@ -1,0 +1,410 @@
+//! The cheapest way over a cost grid (paper TD 5.1). This file guarantees that Dijkstra and A*
+//! return a path of the same, least cost, and that the same request gives the same path.
+//!
+//! The graph is 8-connected; a diagonal step needs both orthogonal neighbours free (READING.md
+//! item 8), so a path never cuts the corner of an obstacle.
+
+use crate::grid::{BLOCKED, Cell, CostGrid};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::f64::consts::SQRT_2;
+use thiserror::Error;
+
+/// What one step from a node to its neighbour costs (READING.md item 8).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum CostModel {
+    /// Step length times the mean of both node costs.
+    #[default]
+    LengthMean,
+    /// Step length times the cost of the node stepped on.
+    LengthDest,
+    /// The cost of the node stepped on, whatever the step's length, and of the start (TD 5.1).
+    NodeSum,
+}
+
+/// How the search orders the nodes it looks at; the cost of the path is the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Algorithm {
+    /// By cost so far, as the paper does.
+    Dijkstra,
+    /// By cost so far plus the octile distance to the goal at the grid's least cost.
+    #[default]
+    AStar,
+}
+
+/// One question to [`Search::find`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Request {
+    /// Where the path begins.
+    pub start: Cell,
+    /// Where it shall end.
+    pub goal: Cell,
+    /// The price of a step.
+    pub model: CostModel,
+    /// The order of the search.
+    pub algorithm: Algorithm,
+    /// A blocked start gives way to the nearest free cell, and a blocked or unreachable goal to the
+    /// nearest reachable cell, up to this many metres away; 0 allows neither.
+    pub tolerance: f64,
+}
+
+impl Request {
+    /// From `start` to `goal` by A* under [`CostModel::LengthMean`], ends exactly as given.
+    pub fn new(start: Cell, goal: Cell) -> Self {
+        Self {
+            start,
+            goal,
+            model: CostModel::default(),
+            algorithm: Algorithm::default(),
+            tolerance: 0.0,
+        }
+    }
+}
+
+/// The cheapest path.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Path {
+    /// The cells from the first to the last, each a neighbour of the one before.
+    pub cells: Vec<Cell>,
+    /// Its cost: metres times node cost, or under [`CostModel::NodeSum`] the sum of node costs.
+    pub cost: f64,
+}
+
+/// Why there is no path.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+pub enum PathError {
+    /// The start lies outside the grid.
+    #[error("the start, cell {0:?}, lies outside the grid")]
+    StartOutside(Cell),
+    /// The goal lies outside the grid.
+    #[error("the goal, cell {0:?}, lies outside the grid")]
+    GoalOutside(Cell),
+    /// The start is blocked and so is all around it.
+    #[error("the start, cell {start:?}, is blocked, and so is everything within {tolerance} m")]
+    StartBlocked {
+        /// The start asked for.
+        start: Cell,
+        /// How far away a free cell was looked for, metres.
+        tolerance: f64,
+    },
+    /// The goal is blocked and so is all around it.
+    #[error("the goal, cell {goal:?}, is blocked, and so is everything within {tolerance} m")]
+    GoalBlocked {
+        /// The goal asked for.
+        goal: Cell,
+        /// How far away a free cell was looked for, metres.
+        tolerance: f64,
+    },
+    /// No way leads from the start to the goal or near it.
+    #[error("nothing within {tolerance} m of cell {goal:?} can be reached from cell {start:?}")]
+    Unreachable {
+        /// The start asked for.
+        start: Cell,
+        /// The goal asked for.
+        goal: Cell,
+        /// How far from the goal an end was looked for, metres.
+        tolerance: f64,
+    },
+}
+
+/// A node waiting to be looked at: total estimate, estimate to the goal (of equal totals the node
+/// nearer to the goal goes first), index. Bits of non-negative floats order like the floats.
+type Waiting = Reverse<(u64, u32, u32)>;
+
+/// A path search that keeps its memory from one call to the next.
+#[derive(Debug, Clone, Default)]
+pub struct Search {
+    /// Node costs with a blocked border around, so that no step needs a bounds check of its own.
+    costs: Vec<f64>,
+    cost_so_far: Vec<f64>,
+    /// The direction, an index of [`STEPS`], by which each node was reached.
+    reached_by: Vec<u8>,
+    open: BinaryHeap<Waiting>,
+    stride: usize,
+    least_cost: f64,
+}
+
+/// Columns and rows of the eight steps: four straight, then four diagonal ones.
+const STEPS: [(isize, isize); 8] = [
+    (1, 0),
+    (-1, 0),
+    (0, 1),
+    (0, -1),
+    (1, 1),
+    (-1, 1),
+    (1, -1),
+    (-1, -1),
+];
+
+impl Search {
+    /// The cheapest path that answers `request` on `grid`.
+    ///
+    /// # Errors
+    /// [`PathError`] where an end lies outside the grid or no allowed path exists.
+    ///
+    /// # Complexity
+    /// O(n log n) for n cells; no allocation beyond the path once the buffers have grown.
+    pub fn find(&mut self, grid: &CostGrid, request: &Request) -> Result<Path, PathError> {
+        let &Request {
+            start,
+            goal,
+            tolerance,
+            ..
+        } = request;
+        let outside = |cell: Cell| cell.0 >= grid.width || cell.1 >= grid.height;
+        if outside(start) {
+            return Err(PathError::StartOutside(start));
+        }
+        if outside(goal) {
+            return Err(PathError::GoalOutside(goal));
+        }
+        let starts = free_cells_near(grid, start, if free(grid, start) { 0.0 } else { tolerance });
+        if starts.is_empty() {
+            return Err(PathError::StartBlocked { start, tolerance });
+        }
+        let goals = free_cells_near(grid, goal, tolerance);
+        let Some(&nearest_goal) = goals.first() else {
+            return Err(PathError::GoalBlocked { goal, tolerance });
+        };
+        self.load(grid);
+        // A search that does not meet the nearest goal has seen all that its start can reach, so
+        // each further search begins in a part of the grid not seen before.
+        let mut seen = vec![false; starts.len()];
+        for k in 0..starts.len() {
+            if seen[k] {
+                continue;
+            }
+            self.expand(starts[k], nearest_goal, request);
+            if let Some(&end) = goals.iter().find(|&&cell| self.reached(cell)) {
+                return Ok(self.trace(grid, starts[k], end, request.model));
+            }
+            for (cell, seen) in starts.iter().zip(&mut seen) {
+                *seen |= self.reached(*cell);
+            }
+        }
+        Err(PathError::Unreachable {
+            start,
+            goal,
+            tolerance,
+        })
+    }
+
+    fn load(&mut self, grid: &CostGrid) {
+        self.stride = grid.width + 2;
+        let size = self.stride * (grid.height + 2);
+        self.costs.clear();
+        self.costs.resize(size, f64::INFINITY);
+        self.least_cost = f64::INFINITY;
+        for row in 0..grid.height {
+            let from = &grid.costs[row * grid.width..(row + 1) * grid.width];
+            let into = &mut self.costs[(row + 1) * self.stride + 1..][..grid.width];
+            for (into, &cost) in into.iter_mut().zip(from) {
+                // NaN and negative costs have no meaning: such a cell is not entered.
+                *into = if cost >= 0.0 {
+                    f64::from(cost)
+                } else {
+                    f64::INFINITY
+                };
+                self.least_cost = self.least_cost.min(*into);
+            }
+        }
+    }
+
+    fn padded(&self, cell: Cell) -> usize {
+        (cell.1 + 1) * self.stride + cell.0 + 1
+    }
+
+    fn reached(&self, cell: Cell) -> bool {
+        self.cost_so_far[self.padded(cell)].is_finite()
+    }
+
+    /// Searches from `start` until `goal` is settled or nothing is left.
+    fn expand(&mut self, start: Cell, goal: Cell, request: &Request) {
+        match request.model {
+            CostModel::LengthMean => {
+                self.expand_with(start, goal, request, |from, to, length| {
+                    length * 0.5 * (from + to)
+                });
+            }
+            CostModel::LengthDest => {
+                self.expand_with(start, goal, request, |_, to, length| length * to);
+            }
+            CostModel::NodeSum => self.expand_with(start, goal, request, |_, to, _| to),
+        }
+    }
+
+    fn expand_with(
+        &mut self,
+        start: Cell,
+        goal: Cell,
+        request: &Request,
+        price: impl Fn(f64, f64, f64) -> f64,
+    ) {
+        match request.algorithm {
+            Algorithm::Dijkstra => self.search(start, goal, price, |_| 0.0),
+            Algorithm::AStar => {
+                let (stride, least) = (self.stride, self.least_cost);
+                let (x, y) = (goal.0 + 1, goal.1 + 1);
+                // Under NodeSum a diagonal step costs no more than a straight one.
+                let diagonal = if request.model == CostModel::NodeSum {
+                    1.0
+                } else {
+                    SQRT_2
+                } - 1.0;
+                self.search(start, goal, price, |node| {
+                    let across = (node % stride).abs_diff(x) as f64;
+                    let along = (node / stride).abs_diff(y) as f64;
+                    least * (across.max(along) + diagonal * across.min(along))
+                });
+            }
+        }
+    }
+
+    fn search(
+        &mut self,
+        start: Cell,
+        goal: Cell,
+        price: impl Fn(f64, f64, f64) -> f64,
+        estimate: impl Fn(usize) -> f64,
+    ) {
+        let size = self.costs.len();
+        self.cost_so_far.clear();
+        self.cost_so_far.resize(size, f64::INFINITY);
+        self.reached_by.clear();
+        self.reached_by.resize(size, u8::MAX);
+        self.open.clear();
+        let stride = self.stride.cast_signed();
+        let steps = STEPS.map(|(column, row)| row * stride + column);
+        let waiting = |node: usize, cost: f64| {
+            let estimate = estimate(node);
+            Reverse((
+                (cost + estimate).to_bits(),
+                (estimate as f32).to_bits(),
+                node as u32,
+            ))
+        };
+        let (start, goal) = (self.padded(start), self.padded(goal));
+        self.cost_so_far[start] = 0.0;
+        self.open.push(waiting(start, 0.0));
+        while let Some(next) = self.open.pop() {
+            let node = next.0.2 as usize;
+            if node == goal {
+                return;
+            }
+            let so_far = self.cost_so_far[node];
+            if waiting(node, so_far).0.0 < next.0.0 {
+                continue; // a cheaper way to this node came up meanwhile
+            }
+            let from = self.costs[node];
+            // Which of the straight neighbours are free decides over the diagonals.
+            let mut straight_free = [false; 4];
+            for (k, step) in steps.iter().enumerate() {
+                let length = if k < 4 {
+                    1.0
+                } else {
+                    let (column, row) = STEPS[k];
+                    let across = straight_free[usize::from(column < 0)];
+                    if !(across && straight_free[2 + usize::from(row < 0)]) {
+                        continue;
+                    }
+                    SQRT_2
+                };
+                let neighbour = node.wrapping_add_signed(*step);
+                let to = self.costs[neighbour];
+                if k < 4 {
+                    straight_free[k] = to.is_finite();
+                }
+                let cost = so_far + price(from, to, length);
+                if cost < self.cost_so_far[neighbour] {
+                    self.cost_so_far[neighbour] = cost;
+                    self.reached_by[neighbour] = k as u8;
+                    self.open.push(waiting(neighbour, cost));
+                }
+            }
+        }
+    }
+
+    fn trace(&self, grid: &CostGrid, start: Cell, end: Cell, model: CostModel) -> Path {
+        let mut cells = vec![end];
+        let mut cell = end;
+        while cell != start {
+            let (column, row) = STEPS[usize::from(self.reached_by[self.padded(cell)])];
+            cell = (
+                cell.0.wrapping_add_signed(-column),
+                cell.1.wrapping_add_signed(-row),
+            );
+            cells.push(cell);
+        }
+        cells.reverse();
+        let cost = self.cost_so_far[self.padded(end)];
+        let cost = match model {
+            CostModel::LengthMean | CostModel::LengthDest => cost * grid.resolution,
+            CostModel::NodeSum => cost + f64::from(grid.cost(start)),
+        };
+        Path { cells, cost }
+    }
+}
+
+fn free(grid: &CostGrid, cell: Cell) -> bool {
+    grid.cost(cell) < BLOCKED
+}
+
+/// The free cells whose centre is at most `tolerance` metres from that of `cell`, nearest first.
+pub(super) fn free_cells_near(grid: &CostGrid, cell: Cell, tolerance: f64) -> Vec<Cell> {
+    if tolerance <= 0.0 {
+        return if free(grid, cell) {
+            vec![cell]
+        } else {
+            Vec::new()
+        };
+    }
+    let reach = tolerance / grid.resolution;
+    let span = |centre: usize, end: usize| {
+        centre.saturating_sub(reach as usize)..(centre + reach as usize + 1).min(end)
+    };
+    let mut near: Vec<(usize, Cell)> = span(cell.1, grid.height)
+        .flat_map(|row| span(cell.0, grid.width).map(move |column| (column, row)))
+        .filter(|&candidate| free(grid, candidate))
+        .map(|near| {
+            (
+                near.0.abs_diff(cell.0).pow(2) + near.1.abs_diff(cell.1).pow(2),
+                near,
+            )
+        })
+        .filter(|&(squared, _)| squared as f64 <= reach * reach + 1e-9)
+        .collect();
+    near.sort_unstable_by_key(|&(squared, (column, row))| (squared, row, column));
+    near.into_iter().map(|(_, cell)| cell).collect()
+}
+
+/// The cost of walking `cells` on `grid` under `model`, infinite where a step is not allowed; so a
+/// path found earlier can be judged on the grid as it is now.
+///
+/// # Panics
+/// If a cell lies outside the grid.
+pub fn cost_of(grid: &CostGrid, cells: &[Cell], model: CostModel) -> f64 {
+    let node = |cell: Cell| f64::from(grid.cost(cell));
+    let first = cells.first().map_or(0.0, |&cell| node(cell));
+    let steps = cells.windows(2).map(|step| {
+        let (from, to) = (step[0], step[1]);
+        let diagonal = from.0 != to.0 && from.1 != to.1;
+        if diagonal && !(free(grid, (from.0, to.1)) && free(grid, (to.0, from.1))) {
+            return f64::INFINITY;
+        }
+        let length = grid.resolution * if diagonal { SQRT_2 } else { 1.0 };
+        match model {
+            CostModel::LengthMean => length * 0.5 * (node(from) + node(to)),
+            CostModel::LengthDest => length * node(to),
+            CostModel::NodeSum => node(to),
+        }
+    });
+    steps.sum::<f64>()
+        + if model == CostModel::NodeSum {
+            first
+        } else {
+            0.0
+        }
+}
+
+#[cfg(test)]
+mod tests;

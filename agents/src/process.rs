@@ -1,0 +1,158 @@
+//! The agents as processes: each takes turns, gives its core what has come in, and does what the
+//! core decided. It guarantees that a turn whose snapshot was overtaken is left out, not guessed.
+
+use crate::grid::CostGrid;
+use crate::human_observer::HumanObserver;
+use crate::messages::{
+    CameraFrame, DETECTIONS, LASER, LaserScan, ODOMETRY, Odometry, SPEECH, Speech, VELOCITY,
+    VelocityCommand,
+};
+use crate::navigation::graph::{Messages, Navigation};
+use crate::object_recognition::ObjectRecognition;
+use crate::social_mapping::graph::{SocialMapping, StepError};
+use crate::social_mapping::config::{ConfigError, SocialConfig};
+use dsr::{AttachError, InstanceError, ReadError, Session, Snapshot, Time, Transaction, TurnError, Turns};
+use thiserror::Error;
+
+/// Channel of the social grid, as [`CostGrid::to_bytes`].
+pub const SOCIAL_GRID: &str = "social_grid";
+/// Seconds between updates of the social map.
+const MAP_PERIOD: f64 = 0.1;
+
+/// Why an agent cannot go on.
+#[derive(Debug, Error)]
+pub enum ProcessError {
+    /// The graph cannot be seen.
+    #[error(transparent)]
+    Attach(#[from] AttachError),
+    /// The instance cannot be used.
+    #[error(transparent)]
+    Instance(#[from] InstanceError),
+    /// There are no turns.
+    #[error(transparent)]
+    Turn(#[from] TurnError),
+    /// The graph's memory is damaged.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The social map's configuration is wrong.
+    #[error("{} faults in the configuration, the first: {}", .0.len(), .0[0])]
+    Config(Vec<ConfigError>),
+}
+
+/// What a core made of a snapshot, or nothing where the snapshot was overtaken.
+fn current<T>(outcome: Result<T, ReadError>) -> Result<Option<T>, ReadError> {
+    match outcome {
+        Ok(done) => Ok(Some(done)),
+        Err(ReadError::SnapshotTooOld { version, oldest }) => {
+            tracing::debug!("version {version} was overtaken by {oldest}: this turn is left out");
+            Ok(None)
+        }
+        Err(damaged) => Err(damaged),
+    }
+}
+
+/// Takes turns with a core that makes a transaction of camera frames.
+fn perceive(
+    mut session: Session,
+    mut turns: Turns,
+    mut step: impl FnMut(Time, &[CameraFrame], &Snapshot) -> Result<Transaction, ReadError>,
+) -> Result<(), ProcessError> {
+    let mut frames = session.subscriber::<CameraFrame>(DETECTIONS)?;
+    while let Some(tick) = turns.next(&mut session)? {
+        let seen = frames.drain()?;
+        let snapshot = session.snapshot()?;
+        if let Some(transaction) = current(step(tick.time, &seen, &snapshot))? {
+            session.submit(&transaction, tick.time)?;
+        }
+    }
+    Ok(())
+}
+
+/// Runs the human observer until it shall end.
+///
+/// # Errors
+/// [`ProcessError`].
+pub fn human_observer(session: Session, turns: Turns) -> Result<(), ProcessError> {
+    let mut core = HumanObserver::new(crate::human_observer::Config::default());
+    perceive(session, turns, |now, frames, snapshot| core.step(now, frames, snapshot))
+}
+
+/// Runs object recognition until it shall end.
+///
+/// # Errors
+/// [`ProcessError`].
+pub fn object_recognition(session: Session, turns: Turns) -> Result<(), ProcessError> {
+    let mut core = ObjectRecognition::new(crate::object_recognition::Config::default());
+    perceive(session, turns, |now, frames, snapshot| core.step(now, frames, snapshot))
+}
+
+/// Runs social mapping until it shall end.
+///
+/// # Errors
+/// [`ProcessError`].
+pub fn social_mapping(mut session: Session, mut turns: Turns) -> Result<(), ProcessError> {
+    let grids = session.publisher::<Vec<u8>>(SOCIAL_GRID)?;
+    let core = SocialMapping::new(SocialConfig::default(), MAP_PERIOD);
+    let mut core = core.map_err(ProcessError::Config)?;
+    while let Some(tick) = turns.next(&mut session)? {
+        let snapshot = session.snapshot()?;
+        let turn = match core.step(tick.time, &snapshot) {
+            Ok(turn) => turn,
+            Err(StepError::Read(error)) => {
+                tracing::debug!("{error}: this turn is left out");
+                continue;
+            }
+            Err(error) => {
+                tracing::warn!(time = %tick.time, "no map: {error}");
+                continue;
+            }
+        };
+        for rejection in &turn.rejected {
+            tracing::warn!(time = %tick.time, "{rejection}");
+        }
+        if let Some(grid) = &turn.grid {
+            grids.send(&grid.to_bytes())?;
+        }
+        session.submit(&turn.transaction, tick.time)?;
+    }
+    Ok(())
+}
+
+/// Runs navigation until it shall end; the robot is told to stand at the end.
+///
+/// # Errors
+/// [`ProcessError`].
+pub fn navigation(mut session: Session, mut turns: Turns) -> Result<(), ProcessError> {
+    let mut odometry = session.subscriber::<Odometry>(ODOMETRY)?;
+    let mut scans = session.subscriber::<LaserScan>(LASER)?;
+    let mut grids = session.subscriber::<Vec<u8>>(SOCIAL_GRID)?;
+    let velocity = session.publisher::<VelocityCommand>(VELOCITY)?;
+    let speech = session.publisher::<Speech>(SPEECH)?;
+    let mut core = Navigation::new(crate::navigation::navigator::Config::default());
+    let (mut pose, mut scan, mut grid) = (None, None, None);
+    while let Some(tick) = turns.next(&mut session)? {
+        pose = odometry.newest()?.or(pose);
+        scan = scans.newest()?.or(scan);
+        if let Some(bytes) = grids.newest()? {
+            match CostGrid::from_bytes(&bytes) {
+                Ok(newest) => grid = Some(newest),
+                Err(error) => tracing::warn!("a grid that cannot be read: {error}"),
+            }
+        }
+        let snapshot = session.snapshot()?;
+        let messages =
+            Messages { odometry: pose.as_ref(), scan: scan.as_ref(), grid: grid.as_ref() };
+        let Some(effects) = current(core.step(tick.time, &messages, &snapshot))? else { continue };
+        velocity.send(&effects.command)?;
+        if let Some(words) = &effects.speech {
+            speech.send(words)?;
+        }
+        for transaction in &effects.transactions {
+            session.submit(transaction, tick.time)?;
+        }
+    }
+    if let Some(last) = pose {
+        velocity.send(&VelocityCommand { time: last.time, linear: 0.0, angular: 0.0 })?;
+    }
+    Ok(())
+}

@@ -1,0 +1,324 @@
+//! Graph JSON, format `dsr/1`: a whole graph as people and other programs read it. This file
+//! guarantees that what was written can be read again without loss.
+//!
+//! ```json
+//! {"format":"dsr/1",
+//!  "nodes":[{"id":1,"type":"room","name":"kitchen","attributes":{"area":12.5}}],
+//!  "edges":[{"from":1,"label":"connected","to":2,"attributes":{}}]}
+//! ```
+//!
+//! An attribute that is a bool, an `i64`, a finite `f64` or a string is a plain JSON value; any
+//! other is `{"type":KIND,"value":...}` with a kind of [`ValueKind::name`]. Whole `f64` have a
+//! decimal point. `u64` are strings, for most programs read JSON numbers as `f64`.
+
+use crate::{NodeId, Operation, Pose, ReadError, Snapshot, Transaction, Value, ValueKind};
+use nalgebra::{Quaternion, Translation3, UnitQuaternion};
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value as Json, json};
+use thiserror::Error;
+
+/// The name of the format.
+pub const FORMAT: &str = "dsr/1";
+
+/// Why a graph file cannot be read.
+#[derive(Debug, Error)]
+pub enum JsonError {
+    /// It is not JSON, or not of this shape.
+    #[error("{0}")]
+    Syntax(#[from] serde_json::Error),
+    /// It is of another format.
+    #[error("the format is `{0}`, not `{FORMAT}`")]
+    Format(String),
+    /// An attribute cannot be read.
+    #[error("attribute `{attribute}` of {owner}: {reason}")]
+    Attribute {
+        /// Of what.
+        owner: String,
+        /// Which.
+        attribute: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// An edge ends at a node that the file does not have.
+    #[error("an edge `{label}` ends at node {node}, which is not in the file")]
+    NoSuchNode {
+        /// The edge's label.
+        label: String,
+        /// The node.
+        node: u64,
+    },
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+struct File {
+    format: String,
+    nodes: Vec<NodeRow>,
+    #[serde(default)]
+    edges: Vec<EdgeRow>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+struct NodeRow {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    id: Option<u64>,
+    r#type: String,
+    name: String,
+    #[serde(default)]
+    attributes: Map<String, Json>,
+}
+
+/// A node as an edge names it: by id, or by name where the file has no ids.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(untagged)]
+enum End {
+    Id(u64),
+    Name(String),
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+struct EdgeRow {
+    from: End,
+    label: String,
+    to: End,
+    #[serde(default)]
+    attributes: Map<String, Json>,
+}
+
+/// A value as JSON.
+pub fn value_to_json(value: &Value) -> Json {
+    let typed = |json: Json| json!({"type": value.kind().name(), "value": json});
+    // JSON has no word for these numbers.
+    let number = |x: f64| if x.is_finite() { json!(x) } else { json!(x.to_string()) };
+    match value {
+        Value::Bool(b) => json!(b),
+        Value::I64(n) => json!(n),
+        Value::F64(x) if x.is_finite() => json!(x),
+        Value::String(text) => json!(text),
+        Value::F64(x) => typed(number(*x)),
+        Value::I32(n) => typed(json!(n)),
+        Value::U32(n) => typed(json!(n)),
+        Value::U64(n) => typed(json!(n.to_string())),
+        Value::F32(x) => typed(number(f64::from(*x))),
+        Value::Vector(row) | Value::F64List(row) => typed(row.iter().copied().map(number).collect()),
+        Value::F32Vector(row) | Value::F32List(row) => {
+            typed(row.iter().map(|&x| number(f64::from(x))).collect())
+        }
+        Value::U8List(bytes) => typed(json!(bytes)),
+        Value::U64List(row) => typed(row.iter().map(|n| json!(n.to_string())).collect()),
+        Value::Pose(pose) => {
+            let (t, q) = (pose.translation.vector, pose.rotation.coords);
+            typed(json!({"translation": [t.x, t.y, t.z], "rotation": [q.x, q.y, q.z, q.w]}))
+        }
+    }
+}
+
+/// A value from JSON: the inverse of [`value_to_json`]. A plain whole number is an `i64` and a
+/// plain array of numbers an `f64` vector (up to 6) or list, unless `expected` says otherwise.
+///
+/// # Errors
+/// What is wrong, in words.
+pub fn value_from_json(json: &Json, expected: Option<ValueKind>) -> Result<Value, String> {
+    let (kind, json) = match json {
+        Json::Object(map) if map.contains_key("type") => {
+            let name = map.get("type").and_then(Json::as_str).unwrap_or_default();
+            let kind = ValueKind::from_name(name).ok_or_else(|| {
+                let known = ValueKind::ALL.map(ValueKind::name);
+                let help = crate::suggest(name, known).map(|k| format!(", did you mean `{k}`?"));
+                format!("unknown kind of value `{name}`{}", help.unwrap_or_default())
+            })?;
+            (kind, map.get("value").unwrap_or(&Json::Null))
+        }
+        other => {
+            let plain = expected.or(match other {
+                Json::Bool(_) => Some(ValueKind::Bool),
+                Json::Number(n) if n.is_i64() => Some(ValueKind::I64),
+                Json::Number(n) if n.is_u64() => Some(ValueKind::U64),
+                Json::Number(_) => Some(ValueKind::F64),
+                Json::String(_) => Some(ValueKind::String),
+                Json::Array(row) if (1..=6).contains(&row.len()) => Some(ValueKind::Vector),
+                Json::Array(_) => Some(ValueKind::F64List),
+                _ => None,
+            });
+            (plain.ok_or("null and untyped objects are no values")?, other)
+        }
+    };
+    decode(kind, json).ok_or_else(|| format!("{json} is not a {kind}"))
+}
+
+fn decode(kind: ValueKind, json: &Json) -> Option<Value> {
+    let number = |json: &Json| json.as_f64().or_else(|| json.as_str()?.parse::<f64>().ok());
+    let natural = |json: &Json| json.as_u64().or_else(|| json.as_str()?.parse::<u64>().ok());
+    let numbers = || json.as_array()?.iter().map(number).collect::<Option<Vec<_>>>();
+    let singles = || Some(numbers()?.into_iter().map(|x| x as f32).collect::<Vec<_>>());
+    let six = |len: usize| (1..=6).contains(&len).then_some(());
+    Some(match kind {
+        ValueKind::Bool => Value::Bool(json.as_bool()?),
+        ValueKind::I32 => Value::I32(i32::try_from(json.as_i64()?).ok()?),
+        ValueKind::U32 => Value::U32(u32::try_from(natural(json)?).ok()?),
+        ValueKind::I64 => Value::I64(json.as_i64()?),
+        ValueKind::U64 => Value::U64(natural(json)?),
+        ValueKind::F32 => Value::F32(number(json)? as f32),
+        ValueKind::F64 => Value::F64(number(json)?),
+        ValueKind::String => Value::String(json.as_str()?.to_owned()),
+        ValueKind::Vector => {
+            let row = numbers()?;
+            six(row.len())?;
+            Value::Vector(row)
+        }
+        ValueKind::F32Vector => {
+            let row = singles()?;
+            six(row.len())?;
+            Value::F32Vector(row)
+        }
+        ValueKind::F64List => Value::F64List(numbers()?),
+        ValueKind::F32List => Value::F32List(singles()?),
+        ValueKind::U8List => {
+            let byte = |json: &Json| u8::try_from(json.as_u64()?).ok();
+            Value::U8List(json.as_array()?.iter().map(byte).collect::<Option<_>>()?)
+        }
+        ValueKind::U64List => {
+            Value::U64List(json.as_array()?.iter().map(natural).collect::<Option<_>>()?)
+        }
+        ValueKind::Pose => {
+            let row = |name: &str| {
+                let row = json.get(name)?.as_array()?.iter().map(Json::as_f64);
+                row.collect::<Option<Vec<_>>>()
+            };
+            let (translation, rotation) = (row("translation")?, row("rotation")?);
+            let (&[x, y, z], &[i, j, k, w]) =
+                (translation.first_chunk::<3>()?, rotation.first_chunk::<4>()?);
+            let quaternion = Quaternion::new(w, i, j, k);
+            // Written by us it is of length one already, and stays what it was to the last bit.
+            let rotation = if (quaternion.norm() - 1.0).abs() < 1e-12 {
+                UnitQuaternion::new_unchecked(quaternion)
+            } else {
+                UnitQuaternion::try_new(quaternion, 1e-9)?
+            };
+            Value::Pose(Pose::from_parts(Translation3::new(x, y, z), rotation))
+        }
+    })
+}
+
+/// A snapshot as graph JSON: nodes by id, edges by source, label and target.
+///
+/// # Errors
+/// [`ReadError`].
+pub fn to_json(snapshot: &Snapshot) -> Result<Json, ReadError> {
+    let schema = snapshot.schema();
+    let attributes = |list: Vec<crate::Attribute>| -> Map<String, Json> {
+        list.iter()
+            .map(|a| (schema.attribute_name(a.name).to_owned(), value_to_json(&a.value)))
+            .collect()
+    };
+    let (mut nodes, mut edges) = (Vec::new(), Vec::new());
+    for node in snapshot.nodes() {
+        let node = node?;
+        nodes.push(NodeRow {
+            id: Some(node.id().0),
+            r#type: node.type_name().to_owned(),
+            name: node.name()?,
+            attributes: attributes(node.attributes()?),
+        });
+        for key in node.out_edges() {
+            let key = key?;
+            let found = snapshot.find_edge(key)?.map(|edge| edge.attributes()).transpose()?;
+            edges.push(EdgeRow {
+                from: End::Id(key.from.0),
+                label: schema.label_name(key.label).to_owned(),
+                to: End::Id(key.to.0),
+                attributes: attributes(found.unwrap_or_default()),
+            });
+        }
+    }
+    nodes.sort_by_key(|node| node.id);
+    let id = |end: &End| if let End::Id(id) = end { *id } else { 0 };
+    edges.sort_by(|a, b| {
+        (id(&a.from), &a.label, id(&a.to)).cmp(&(id(&b.from), &b.label, id(&b.to)))
+    });
+    Ok(json!(File { format: FORMAT.to_owned(), nodes, edges }))
+}
+
+/// The transaction that makes, on an empty graph, what the graph JSON says.
+///
+/// # Errors
+/// [`JsonError`].
+pub fn from_json(text: &str) -> Result<Transaction, JsonError> {
+    let text = text.trim_start_matches('\u{feff}');
+    let file: File = serde_json::from_str(text)?;
+    if file.format != FORMAT {
+        return Err(JsonError::Format(file.format));
+    }
+    let attributes = |owner: &str, map: Map<String, Json>| {
+        map.into_iter()
+            .map(|(attribute, json)| match value_from_json(&json, None) {
+                Ok(value) => Ok((attribute, value)),
+                Err(reason) => {
+                    Err(JsonError::Attribute { owner: owner.to_owned(), attribute, reason })
+                }
+            })
+            .collect::<Result<Vec<_>, _>>()
+    };
+    let known: std::collections::BTreeSet<u64> = file.nodes.iter().filter_map(|n| n.id).collect();
+    let mut transaction = Transaction::new();
+    for node in file.nodes {
+        transaction.push(Operation::CreateNode {
+            id: node.id.map(NodeId),
+            attributes: attributes(&node.name, node.attributes)?,
+            type_name: node.r#type,
+            name: node.name,
+        });
+    }
+    for edge in file.edges {
+        let end = |end: End| match end {
+            End::Id(id) if !known.contains(&id) => {
+                Err(JsonError::NoSuchNode { label: edge.label.clone(), node: id })
+            }
+            End::Id(id) => Ok(NodeId(id).into()),
+            End::Name(name) => Ok(crate::NodeRef::Name(name)),
+        };
+        let (from, to) = (end(edge.from)?, end(edge.to)?);
+        let key = crate::EdgeRef { from, label: edge.label.clone(), to };
+        let attributes = attributes(&key.to_string(), edge.attributes)?;
+        transaction.push(Operation::CreateEdge { edge: key, attributes });
+    }
+    Ok(transaction)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Graph, Schema, Time};
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn every_value_survives_json(value in crate::graph::tests::value()) {
+            let text = value_to_json(&value).to_string();
+            let back = value_from_json(&serde_json::from_str(&text).unwrap(), None).unwrap();
+            prop_assert_eq!(back, value);
+        }
+    }
+
+    #[test]
+    fn a_graph_survives_json() {
+        let text = r#"{"format":"dsr/1","nodes":[
+            {"id":7,"type":"room","name":"kitchen","attributes":{"area":12.0,"n":3}},
+            {"id":2,"type":"robot","name":"shelly","attributes":{"id":{"type":"u64","value":"18446744073709551615"}}}],
+            "edges":[{"from":2,"label":"in","to":7,"attributes":{"since":{"type":"f32_list","value":[0.5]}}}]}"#;
+        let mut graph = Graph::in_memory(Schema::open());
+        graph.commit(&from_json(text).unwrap(), "test", Time::default()).unwrap();
+        let once = to_json(&graph.snapshot()).unwrap();
+        let mut again = Graph::in_memory(Schema::open());
+        again.commit(&from_json(&once.to_string()).unwrap(), "test", Time::default()).unwrap();
+        assert_eq!(to_json(&again.snapshot()).unwrap(), once);
+        assert_eq!(once["nodes"][1]["attributes"]["area"].to_string(), "12.0");
+    }
+
+    #[test]
+    fn broken_files_are_told_with_their_place() {
+        let place = from_json("{\"format\":\"dsr/1\",\n\"nodes\":[{\"id\":1,").unwrap_err();
+        assert!(place.to_string().ends_with("at line 2 column 17"), "{place}");
+        let far = r#"{"format":"dsr/1","nodes":[],"edges":[{"from":1,"label":"in","to":2}]}"#;
+        assert!(matches!(from_json(far), Err(JsonError::NoSuchNode { node: 1, .. })));
+    }
+}

@@ -1,0 +1,184 @@
+//! The command line: every verb with its flags. Parsing a flag does nothing but parse it.
+
+use clap::{Args, Parser, Subcommand};
+use std::path::PathBuf;
+
+/// A runtime in which the agents of a robot share one world model.
+#[derive(Debug, Parser)]
+#[command(name = "cortex", version, about, propagate_version = true)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Verb {
+    /// Run a scenario: a store, a world and the agents, each a process; then report
+    #[command(after_help = "Example:\n  cortex run scenarios/care-centre --speed 5 --report report")]
+    Run(Run),
+    /// Run one agent of an instance by hand
+    #[command(after_help = "Example:\n  cortex agent human_observer --instance default")]
+    Agent(Agent),
+    /// Run the store of an instance by hand
+    #[command(after_help = "Example:\n  cortex store --scenario scenarios/care-centre --instance mine")]
+    Store(Store),
+    /// Look at and change the shared graph of a running instance, or a graph file
+    #[command(after_help = "Example:\n  cortex graph show --instance default")]
+    Graph(Graph),
+}
+
+/// Which running system.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct InstanceArgs {
+    /// Name of the running system on this host
+    #[arg(long, value_name = "I", default_value = "default")]
+    pub(crate) instance: String,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Run {
+    /// Folder of the scenario
+    pub(crate) scenario: PathBuf,
+    /// Without social behaviour: people are obstacles like any other
+    #[arg(long)]
+    pub(crate) no_social: bool,
+    /// Without the comparison run that shows what social behaviour changed
+    #[arg(long)]
+    pub(crate) no_baseline: bool,
+    /// Seed of everything that is random
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Simulated seconds per second
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = speed)]
+    pub(crate) speed: f64,
+    /// One process after the other, as fast as the machine can: the same seed gives the same
+    /// report, byte for byte
+    #[arg(long)]
+    pub(crate) lockstep: bool,
+    /// Recorded pedestrians instead of the scenario's people
+    #[arg(long, value_name = "FILE")]
+    pub(crate) tracks: Option<PathBuf>,
+    /// Folder for report.json, the map and the logs [default: reports/SCENARIO]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) report: Option<PathBuf>,
+    /// Print the report as JSON instead of a table
+    #[arg(long)]
+    pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) instance: InstanceArgs,
+}
+
+fn speed(text: &str) -> Result<f64, String> {
+    let speed: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    if speed.is_finite() && (0.01..=1000.0).contains(&speed) {
+        Ok(speed)
+    } else {
+        Err("the speed must lie between 0.01 and 1000".to_owned())
+    }
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Agent {
+    /// human_observer, object_recognition, social_mapping, navigation, executive or world
+    pub(crate) name: String,
+    /// Folder of the scenario; executive and world need it
+    #[arg(long, value_name = "DIR")]
+    pub(crate) scenario: Option<PathBuf>,
+    /// world: seed of everything that is random
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// world: simulated seconds per second
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = speed)]
+    pub(crate) speed: f64,
+    /// world: recorded pedestrians instead of the scenario's people
+    #[arg(long, value_name = "FILE")]
+    pub(crate) tracks: Option<PathBuf>,
+    /// Take turns as a supervisor on standard input gives them
+    #[arg(long)]
+    pub(crate) lockstep: bool,
+    /// End when standard input ends
+    #[arg(long, hide = true)]
+    pub(crate) supervised: bool,
+    #[command(flatten)]
+    pub(crate) instance: InstanceArgs,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Store {
+    /// Folder of the scenario that the graph starts from
+    #[arg(long, value_name = "DIR")]
+    pub(crate) scenario: PathBuf,
+    /// Start from a graph that a supervisor saved, instead of the scenario's
+    #[arg(long, value_name = "FILE")]
+    pub(crate) restore: Option<PathBuf>,
+    /// Tell the agents to do without social behaviour
+    #[arg(long)]
+    pub(crate) no_social: bool,
+    /// End when standard input ends
+    #[arg(long, hide = true)]
+    pub(crate) supervised: bool,
+    #[command(flatten)]
+    pub(crate) instance: InstanceArgs,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Graph {
+    #[command(subcommand)]
+    pub(crate) action: GraphAction,
+    #[command(flatten)]
+    pub(crate) source: GraphSource,
+}
+
+/// Which graph.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct GraphSource {
+    /// Name of the running system on this host
+    #[arg(long, value_name = "I", default_value = "default", global = true, conflicts_with = "file")]
+    pub(crate) instance: String,
+    /// A graph file instead of a running system
+    #[arg(long, value_name = "FILE", global = true)]
+    pub(crate) file: Option<PathBuf>,
+    /// For machines
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Clone, Subcommand)]
+pub(crate) enum GraphAction {
+    /// Show nodes, attributes and edges
+    #[command(after_help = "Example:\n  cortex graph show person --instance default")]
+    Show {
+        /// Only nodes of this type (or its subtypes), or the node of this name
+        what: Option<String>,
+    },
+    /// Print one attribute: NODE.ATTRIBUTE, or FROM-LABEL->TO.ATTRIBUTE of an edge
+    #[command(after_help = "Example:\n  cortex graph get robot.radius")]
+    Get {
+        /// Which
+        path: String,
+    },
+    /// Set one attribute of a running system
+    #[command(after_help = "Example:\n  cortex graph set robot.max_speed 0.4")]
+    Set {
+        /// NODE.ATTRIBUTE, or FROM-LABEL->TO.ATTRIBUTE
+        path: String,
+        /// The value, as in graph JSON
+        value: String,
+    },
+    /// Print commits as they come
+    #[command(after_help = "Example:\n  cortex graph watch in --count 10")]
+    Watch {
+        /// Only commits that touch this type, label, attribute or node
+        filter: Option<String>,
+        /// End after so many
+        #[arg(long, value_name = "N")]
+        count: Option<u64>,
+    },
+    /// Print the whole graph: json or dot
+    #[command(after_help = "Example:\n  cortex graph export json --file world.json")]
+    Export {
+        /// json or dot
+        #[arg(value_parser = ["json", "dot"])]
+        format: String,
+    },
+}

@@ -1,0 +1,82 @@
+//! `cortex agent`: one agent, or the world, as a process of its own.
+
+use crate::cli::Agent as Arguments;
+use crate::{Answer, Failure};
+use dsr::{Pace, Session, Turns};
+use executive::MissionSpec;
+use scenarios::{Scenario, Tracks, World};
+use std::time::Duration;
+
+/// How long an agent waits for the store when it starts.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// The agents, in the order of their turns.
+pub(crate) const AGENTS: [&str; 5] =
+    ["human_observer", "object_recognition", "social_mapping", "navigation", "executive"];
+
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
+    let instance = super::instance(&arguments.instance.instance)?;
+    let name = arguments.name.as_str();
+    let known = || AGENTS.into_iter().chain(["world"]);
+    if !known().any(|known| known == name) {
+        let help = dsr::suggest(name, known()).map_or_else(
+            || format!("one of {}", known().collect::<Vec<_>>().join(", ")),
+            |known| format!("did you mean `{known}`?"),
+        );
+        return Err(Failure::input_with_help(format!("there is no agent `{name}`"), help));
+    }
+    let scenario = || -> Result<Scenario, Failure> {
+        let folder = arguments.scenario.as_ref().ok_or_else(|| {
+            Failure::input_with_help(format!("{name} needs a scenario"), "add --scenario DIR")
+        })?;
+        super::load_scenario(folder)
+    };
+    let pace = match (arguments.lockstep, arguments.supervised) {
+        (true, _) => Pace::Lockstep,
+        (false, true) => Pace::Free,
+        (false, false) => Pace::Alone,
+    };
+    let stop = super::interruption()?;
+    let begin = || Turns::begin(pace, stop).map_err(Failure::internal);
+    // Input is read before anything is joined, so that what is wrong with it is told at once.
+    let outcome = match name {
+        "world" => {
+            let scenario = scenario()?;
+            let tracks = arguments.tracks.as_deref().map(Tracks::load).transpose();
+            let tracks = tracks.map_err(|error| Failure::Input(error.into()))?;
+            let world = World::new(&scenario, arguments.seed, tracks);
+            let session = attach(&instance, name)?;
+            scenarios::process::run(session, begin()?, world, arguments.speed).map_err(Failure::internal)
+        }
+        "executive" => {
+            let scenario = scenario()?;
+            let (_, grammar) = super::load_rules(&scenario)?;
+            let missions = scenario.missions.iter().map(mission).collect();
+            let session = attach(&instance, name)?;
+            executive::process::run(session, begin()?, grammar, missions).map_err(Failure::internal)
+        }
+        _ => {
+            let session = attach(&instance, name)?;
+            let run = match name {
+                "human_observer" => agents::process::human_observer,
+                "object_recognition" => agents::process::object_recognition,
+                "social_mapping" => agents::process::social_mapping,
+                _ => agents::process::navigation,
+            };
+            run(session, begin()?).map_err(Failure::internal)
+        }
+    };
+    outcome.map(|()| Answer::Yes)
+}
+
+fn attach(instance: &dsr::Instance, name: &str) -> Result<Session, Failure> {
+    Session::attach(instance, name, PATIENCE).map_err(Failure::internal)
+}
+
+fn mission(mission: &scenarios::scenario::Mission) -> MissionSpec {
+    MissionSpec {
+        name: mission.name.clone(),
+        goal: mission.goal.clone(),
+        priority: mission.priority,
+    }
+}
