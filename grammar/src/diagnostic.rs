@@ -179,6 +179,26 @@ pub enum Problem {
         /// What stands there.
         found: &'static str,
     },
+    /// A name that the graph's schema does not have.
+    #[error("the schema has no {what} `{name}`")]
+    NotInSchema {
+        /// type, label or attribute.
+        what: &'static str,
+        /// As written.
+        name: String,
+        /// What was probably meant.
+        suggestion: Option<String>,
+    },
+    /// A link that the schema allows between no nodes of these types.
+    #[error("`{label}` never joins a `{from}` to a `{to}` by the schema")]
+    WrongEnds {
+        /// The label.
+        label: String,
+        /// Type of the node that it leaves.
+        from: String,
+        /// Type of the node that it enters.
+        to: String,
+    },
     /// An included file that could not be read.
     #[error("cannot read the included file `{path}`: {reason}")]
     Include {
@@ -204,6 +224,7 @@ impl Problem {
             Self::Expected { suggestion, .. }
             | Self::UnknownVariable { suggestion, .. }
             | Self::UnknownType { suggestion, .. }
+            | Self::NotInSchema { suggestion, .. }
             | Self::UnknownName { suggestion, .. } => suggestion
                 .as_ref()
                 .map(|name| format!("did you mean `{name}`?")),

@@ -103,3 +103,6 @@ impl Grammar {
         )
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -3,7 +3,7 @@
 //! Guarantee: the diagnostics are complete, in the order of the files and of their lines, and
 //! every rule without a syntax error is in the grammar, whatever else is wrong.
 
-use crate::parser::{Finding, Item, ParsedFile, parse_file, parse_goal_file};
+use crate::parser::{Broken, Finding, Item, ParsedFile, ParsedGoal, parse_file, parse_goal_file};
 use crate::{Diagnostic, Goal, Grammar, Name, Problem, Severity, SourceFile, Types, check};
 use std::fmt;
 
@@ -86,14 +86,19 @@ pub fn load_grammar(
 /// ```
 pub fn parse_goal(text: &str, file_name: &str, types: &Types) -> Result<Goal, Defects> {
     let file = SourceFile::new(file_name, text);
-    let (goal, mut findings) = parse_goal_file(text);
+    let ParsedGoal {
+        goal,
+        broken,
+        lost,
+        mut findings,
+    } = parse_goal_file(text);
     if let Some(goal) = &goal {
-        findings.extend(check::check_goal(goal, types));
+        findings.extend(check::check_goal(goal, types, &lost));
     }
     findings.sort_by_key(|finding| finding.span);
     let diagnostics = diagnostics(findings, std::slice::from_ref(&file));
     match goal {
-        Some(goal) if !has_errors(&diagnostics) => Ok(goal),
+        Some(goal) if !broken && !has_errors(&diagnostics) => Ok(goal),
         _ => Err(Defects { diagnostics }),
     }
 }
@@ -140,7 +145,8 @@ impl miette::Diagnostic for Defects {
     }
 }
 
-fn diagnostics(findings: Vec<Finding>, files: &[SourceFile]) -> Vec<Diagnostic> {
+/// Findings with the files that they lie in.
+pub(crate) fn diagnostics(findings: Vec<Finding>, files: &[SourceFile]) -> Vec<Diagnostic> {
     let diagnostic = |finding: Finding| {
         let file = files.get(finding.span.file as usize)?.clone();
         let Finding {
@@ -163,7 +169,7 @@ struct Reading<'a, 'b> {
     loader: &'a mut Loader<'b>,
     grammar: Grammar,
     findings: Vec<Finding>,
-    broken: Vec<Name>,
+    broken: Vec<Broken>,
     missing: bool,
 }
 

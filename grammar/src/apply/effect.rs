@@ -5,7 +5,7 @@
 
 use super::ApplyError;
 use super::change::Changes;
-use crate::matching::{Compiler, Environment, MatchDomain, Slot, Term, Test};
+use crate::matching::{Choices, Compiler, Environment, Slot, Term, Test};
 use crate::{AttributePath, Effect, Expression, MatchError, Name};
 use dsr::Snapshot;
 
@@ -46,8 +46,7 @@ pub(super) enum Action {
         type_name: Name,
     },
     Forall {
-        first: usize,
-        domains: Vec<MatchDomain>,
+        choices: Choices,
         body: Vec<Action>,
     },
     When {
@@ -130,14 +129,15 @@ impl Compiler<'_> {
                 type_name: type_name.clone(),
             },
             Effect::Forall { variables, body } => {
-                let (first, domains) = self.quantify(variables);
+                let outer = self.scope();
+                let mut choices = self.quantify(variables);
                 let body = self.effects(body);
-                self.leave(first);
-                Action::Forall {
-                    first,
-                    domains,
-                    body: body?,
+                self.leave(outer);
+                let body = body?;
+                if let [Action::When { condition, .. }] = &body[..] {
+                    choices.narrow(condition, true);
                 }
+                Action::Forall { choices, body }
             }
             Effect::When { condition, body } => Action::When {
                 condition: self.test(condition)?,
@@ -187,12 +187,15 @@ impl Action {
             Self::Retype { node, type_name } => {
                 changes.retype(environment[*node], type_name)?;
             }
-            Self::Forall {
-                first,
-                domains,
-                body,
-            } => {
-                for_all(body, snapshot, environment, *first, domains, changes)?;
+            // Names of created nodes follow the order.
+            Self::Forall { choices, body } => {
+                let mut run = |environment: &mut Environment| {
+                    for action in body {
+                        action.run(snapshot, environment, changes)?;
+                    }
+                    Ok::<_, ApplyError>(None::<()>)
+                };
+                choices.each_in_order(snapshot, environment, &mut run)?;
             }
             Self::When { condition, body } => {
                 if condition.holds(snapshot, environment)? {
@@ -204,31 +207,6 @@ impl Action {
         }
         Ok(())
     }
-}
-
-/// Runs the actions for every choice of nodes, by ascending ids, which the names of created nodes
-/// follow.
-fn for_all(
-    body: &[Action],
-    snapshot: &Snapshot,
-    environment: &mut Environment,
-    first: usize,
-    domains: &[MatchDomain],
-    changes: &mut Changes<'_>,
-) -> Result<(), ApplyError> {
-    let Some((domain, rest)) = domains.split_first() else {
-        for action in body {
-            action.run(snapshot, environment, changes)?;
-        }
-        return Ok(());
-    };
-    let mut nodes = domain.nodes(snapshot).collect::<Result<Vec<_>, _>>()?;
-    nodes.sort_unstable();
-    for node in nodes {
-        environment[first] = Slot::Node(node);
-        for_all(body, snapshot, environment, first + 1, rest, changes)?;
-    }
-    Ok(())
 }
 
 impl Computed {

@@ -4,21 +4,13 @@
 //! pointed out.
 
 use super::Check;
-use crate::{Combo, ComboVariable, Grammar, Name, PatternNode, Problem, Rule};
+use crate::{Combo, ComboVariable, Grammar, PatternNode, Problem, Rule};
 use dsr::suggest;
 
 impl Check<'_> {
-    pub(super) fn combo(
-        &mut self,
-        grammar: &Grammar,
-        broken: &[Name],
-        missing: bool,
-        combo: &Combo,
-    ) {
+    pub(super) fn combo(&mut self, grammar: &Grammar, combo: &Combo) {
         for (index, step) in combo.steps.iter().enumerate() {
-            if !missing {
-                self.rule_name(grammar, broken, &step.rule);
-            }
+            self.rule_name(&step.rule);
             let earlier = combo.steps[..index]
                 .iter()
                 .find(|other| other.alias == step.alias);

@@ -4,44 +4,64 @@
 //! declared types (where types are declared at all).
 
 mod combo;
+mod schema;
 mod scope;
 
-use crate::parser::Finding;
-use crate::{Goal, Grammar, Name, Pattern, PatternNode, Problem, Types};
+use crate::parser::{Action, Broken, Finding};
+use crate::{Goal, Grammar, Name, Pattern, PatternNode, Problem, Rule, Types};
 use dsr::suggest;
 use scope::Scope;
 
 /// Checks the rules and combos against each other and the types.
 ///
-/// `broken` are rules that exist but could not be read; if files are `missing`, names may be
-/// declared there and are not complained of.
-pub(crate) fn check_grammar(grammar: &Grammar, broken: &[Name], missing: bool) -> Vec<Finding> {
+/// `broken` are rules that are there but have errors in them already: what could be read of them
+/// is checked, too. If files are `missing`, names may be declared there and are not complained of.
+pub(crate) fn check_grammar(grammar: &Grammar, broken: &[Broken], missing: bool) -> Vec<Finding> {
     let mut check = Check {
         types: &grammar.types,
-        types_missing: missing,
+        missing,
+        rules: rule_names(grammar, broken),
         findings: Vec::new(),
     };
     check.type_declarations();
-    check.distinct_rules(grammar, broken);
+    check.distinct_rules();
     for rule in &grammar.rules {
         check.rule(rule);
-        for name in &rule.activates {
-            if !missing {
-                check.rule_name(grammar, broken, name);
-            }
-        }
+        check.activates(rule);
     }
     for combo in &grammar.combos {
-        check.combo(grammar, broken, missing, combo);
+        check.combo(grammar, combo);
     }
-    check.findings
+    let mut findings = std::mem::take(&mut check.findings);
+    for broken in broken {
+        match &broken.action {
+            Some(Action::Rule(rule)) => {
+                check.rule(rule);
+                check.activates(rule);
+            }
+            Some(Action::Combo(combo)) => check.combo(grammar, combo),
+            None => {}
+        }
+        check.forget_lost(&broken.lost);
+        findings.append(&mut check.findings);
+    }
+    findings
 }
 
-/// Checks a goal against types (any type goes if there are none).
-pub(crate) fn check_goal(goal: &Goal, types: &Types) -> Vec<Finding> {
+fn rule_names(grammar: &Grammar, broken: &[Broken]) -> Vec<Name> {
+    let rules = grammar.rules.iter().map(|rule| &rule.name);
+    let combos = grammar.combos.iter().map(|combo| &combo.name);
+    let broken = broken.iter().filter_map(|broken| broken.name.as_ref());
+    rules.chain(combos).chain(broken).cloned().collect()
+}
+
+/// Checks a goal against types (any type goes if there are none). Words in `lost` parts of it
+/// may have declared what the rest uses.
+pub(crate) fn check_goal(goal: &Goal, types: &Types, lost: &[Name]) -> Vec<Finding> {
     let mut check = Check {
         types,
-        types_missing: false,
+        missing: false,
+        rules: Vec::new(),
         findings: Vec::new(),
     };
     check.pattern(&goal.pattern, &[], "left", "in this goal");
@@ -50,12 +70,15 @@ pub(crate) fn check_goal(goal: &Goal, types: &Types) -> Vec<Finding> {
         scope.extend(&goal.pattern.nodes);
         check.condition(condition, &mut scope);
     }
+    check.forget_lost(lost);
     check.findings
 }
 
 struct Check<'a> {
     types: &'a Types,
-    types_missing: bool,
+    missing: bool,
+    /// Of all rules and combos, broken ones included.
+    rules: Vec<Name>,
     findings: Vec<Finding>,
 }
 
@@ -108,7 +131,7 @@ impl Check<'_> {
     }
 
     fn type_name(&mut self, name: &Name) {
-        if self.types.is_empty() || self.types_missing || self.types.contains(name) {
+        if self.types.is_empty() || self.missing || self.types.contains(name) {
             return;
         }
         let suggestion = suggest(name, self.types.names().map(Name::as_str));
@@ -121,38 +144,46 @@ impl Check<'_> {
         );
     }
 
-    fn distinct_rules(&mut self, grammar: &Grammar, broken: &[Name]) {
-        let rules = grammar.rules.iter().map(|rule| &rule.name);
-        let combos = grammar.combos.iter().map(|combo| &combo.name);
-        let mut names: Vec<&Name> = rules.chain(combos).chain(broken).collect();
-        names.sort_by_key(|name| (name.as_str(), name.span()));
+    fn distinct_rules(&mut self) {
+        let mut names = self.rules.clone();
+        names.sort_by(|a, b| (a, a.span()).cmp(&(b, b.span())));
         for pair in names.windows(2) {
             if pair[0] == pair[1] {
-                self.duplicate("rule", pair[0], pair[1]);
+                self.duplicate("rule", &pair[0], &pair[1]);
             }
         }
     }
 
-    fn rule_name(&mut self, grammar: &Grammar, broken: &[Name], name: &Name) {
-        let rules = grammar.rules.iter().map(|rule| &rule.name);
-        let combos = grammar.combos.iter().map(|combo| &combo.name);
-        let names: Vec<&str> = rules
-            .chain(combos)
-            .chain(broken)
-            .map(Name::as_str)
-            .collect();
-        if !names.contains(&name.as_str()) {
-            let suggestion = suggest(name, names);
-            let name_text = name.to_string();
-            self.report(
-                name,
-                Problem::UnknownName {
-                    what: "rule",
-                    name: name_text,
-                    suggestion,
-                },
-            );
+    fn activates(&mut self, rule: &Rule) {
+        for name in &rule.activates {
+            self.rule_name(name);
         }
+    }
+
+    fn rule_name(&mut self, name: &Name) {
+        if self.missing || self.rules.contains(name) {
+            return;
+        }
+        let suggestion = suggest(name, self.rules.iter().map(Name::as_str));
+        let name_text = name.to_string();
+        self.report(
+            name,
+            Problem::UnknownName {
+                what: "rule",
+                name: name_text,
+                suggestion,
+            },
+        );
+    }
+
+    /// Drops complaints about names that the unread parts of a rule may have declared.
+    fn forget_lost(&mut self, lost: &[Name]) {
+        self.findings.retain(|finding| match &finding.problem {
+            Problem::UnknownVariable { name, .. }
+            | Problem::UnknownName { name, .. }
+            | Problem::Deleted { name } => !lost.iter().any(|word| word == name.as_str()),
+            _ => true,
+        });
     }
 
     /// Nodes distinct and of known types; links between known nodes, each once.

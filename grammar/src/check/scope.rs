@@ -3,9 +3,7 @@
 //! Guarantee: every name in a condition, effect or expression was looked up in its scope.
 
 use super::Check;
-use crate::{
-    AttributePath, Condition, Effect, Expression, Literal, Name, PatternNode, Problem, Rule,
-};
+use crate::{AttributePath, Condition, Effect, Expression, Name, PatternNode, Rule};
 
 /// The variables that may be used at a place.
 pub(super) struct Scope {
@@ -58,17 +56,6 @@ impl Check<'_> {
             .flatten()
         {
             self.expression(expression, &before);
-            if let Some(found) = constant_kind(expression).filter(|kind| *kind != "a number") {
-                let (operator, expected) = ("a cost or duration", "a number");
-                self.report(
-                    &rule.name,
-                    Problem::WrongOperand {
-                        operator,
-                        expected,
-                        found,
-                    },
-                );
-            }
         }
         if let Some(condition) = &rule.precondition {
             self.condition(condition, &mut before);
@@ -101,14 +88,9 @@ impl Check<'_> {
                 self.variable(first, scope);
                 self.variable(second, scope);
             }
-            Condition::Compare {
-                operator,
-                left,
-                right,
-            } => {
+            Condition::Compare { left, right, .. } => {
                 self.expression(left, scope);
                 self.expression(right, scope);
-                self.comparable(*operator, left, right);
             }
             Condition::Not(inner) => self.condition(inner, scope),
             Condition::And(all) | Condition::Or(all) => {
@@ -219,68 +201,11 @@ impl Check<'_> {
         match expression {
             Expression::Literal(_) => {}
             Expression::Attribute(path) => self.path(path, scope),
-            Expression::Arithmetic { operator, operands } => {
+            Expression::Arithmetic { operands, .. } => {
                 for operand in operands {
                     self.expression(operand, scope);
-                    if let Some(found) = constant_kind(operand).filter(|k| *k != "a number")
-                        && let Some(at) = names(expression).next().or(scope.bound.first())
-                    {
-                        let (operator, expected) = (operator.symbol(), "numbers");
-                        self.report(
-                            at,
-                            Problem::WrongOperand {
-                                operator,
-                                expected,
-                                found,
-                            },
-                        );
-                    }
                 }
             }
         }
-    }
-
-    /// Two operands of which one is constant and the comparison can never be made.
-    fn comparable(&mut self, operator: crate::Comparison, left: &Expression, right: &Expression) {
-        use crate::Comparison::{Equal, NotEqual};
-        let ordered = !matches!(operator, Equal | NotEqual);
-        for (operand, other) in [(left, right), (right, left)] {
-            let Some(found) = constant_kind(operand).filter(|kind| *kind != "a number") else {
-                continue;
-            };
-            if ordered && let Some(at) = names(other).next() {
-                let (operator, expected) = (operator.symbol(), "numbers");
-                self.report(
-                    at,
-                    Problem::WrongOperand {
-                        operator,
-                        expected,
-                        found,
-                    },
-                );
-            }
-        }
-    }
-}
-
-/// What kind of value it is, if that is known without a graph.
-fn constant_kind(expression: &Expression) -> Option<&'static str> {
-    match expression {
-        Expression::Literal(Literal::Integer(_) | Literal::Real(_))
-        | Expression::Arithmetic { .. } => Some("a number"),
-        Expression::Literal(Literal::Text(_)) => Some("text"),
-        Expression::Literal(Literal::Boolean(_)) => Some("true or false"),
-        Expression::Attribute(_) => None,
-    }
-}
-
-/// The names in it that know where they stand.
-fn names(expression: &Expression) -> Box<dyn Iterator<Item = &Name> + '_> {
-    match expression {
-        Expression::Literal(_) => Box::new(std::iter::empty()),
-        Expression::Attribute(
-            AttributePath::Node { variable: name, .. } | AttributePath::Edge { from: name, .. },
-        ) => Box::new(std::iter::once(name)),
-        Expression::Arithmetic { operands, .. } => Box::new(operands.iter().flat_map(names)),
     }
 }

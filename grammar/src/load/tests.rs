@@ -1,4 +1,5 @@
 //! Files as people bring them: every shape the language had, and everything that can be wrong.
+#![allow(clippy::needless_raw_string_hashes, reason = "expect-test writes them")]
 
 use super::*;
 use crate::testing::{CARE, read};
@@ -134,23 +135,31 @@ good : passive(0)
     let (grammar, diagnostics) = parse_grammar(text, "f.aggl");
     assert_eq!(grammar.rules.len(), 1, "{grammar}");
     expect![[r#"
-        f.aggl:2:1: error: expected `key = value` or `===`, found something else
+        f.aggl:2:1: error: expected `key = value` or `===`, found `what is this`
         f.aggl:7:12: error: no type `rom` (did you mean `room`?)
         f.aggl:8:2: error: type `a` inherits from itself
         f.aggl:9:2: error: type `b` inherits from itself
         f.aggl:14:9: error: expected `active` or `passive`, found `actve` (did you mean `active`?)
+        f.aggl:18:6: error: no variable `k` on the left side (did you mean `r`?)
         f.aggl:19:4: error: expected `:` and a type, or `->` and a node, found `=>`
         f.aggl:26:17: error: expected a number, found `one`
+        f.aggl:26:30: error: the probability must be between 0 and 1, not 1.5
         f.aggl:28:2: error: `{` is never closed
+        f.aggl:35:19: error: no type `kichen` (did you mean `kitchen`?)
+        f.aggl:35:29: error: no variable `qq` on the left side (did you mean `q`?)
+        f.aggl:35:44: error: the link `r->r(x)` is both there and starred on the left side
         f.aggl:40:4: error: expected a link `(label a b)` or an operator, found `foral` (did you mean `forall`?)
         f.aggl:41:3: error: expected a link `(label a b)`, found `(in r)`
         f.aggl:42:3: error: `(` is never closed
         f.aggl:46:1: error: rule `good` is declared twice
+        f.aggl:51:26: error: no variable `robot` on the left side or among the parameters
+        f.aggl:51:46: error: < takes numbers, not text
+        f.aggl:52:15: error: `r` is deleted by this rule (keep the node on the right side, or leave the effect out)
+        f.aggl:52:40: error: + takes numbers, not a truth value
         f.aggl:52:48: error: expected an effect: conditions belong after `when`, found `or`
         f.aggl:54:1: error: `}` closes nothing (remove it, or look for a missing opening bracket)
         f.aggl:54:3: error: unknown character '$'
-        f.aggl:54:11: error: expected `:` after the rule's name, found the end
-        f.aggl:54:11: error: expected `{` and the rule's body, found the end"#]].assert_eq(&Defects { diagnostics }.to_string());
+        f.aggl:54:11: error: expected `:` after the rule's name, found the end"#]].assert_eq(&Defects { diagnostics }.to_string());
 }
 
 #[test]
@@ -168,15 +177,15 @@ r : active(1) activates(s)
 }",
         &expect![[r#"
             f.aggl:6:25: error: no rule `s` (did you mean `r`?)
-            f.aggl:8:4: error: + takes numbers, not true or false
             f.aggl:8:14: error: no type `romo` (did you mean `room`?)
             f.aggl:8:22: error: no variable `qq` on the left side (did you mean `q`?)
             f.aggl:8:37: error: the link `r->r(x)` is both there and starred on the left side
             f.aggl:12:26: error: no variable `robot` on the left side or among the parameters
             f.aggl:12:43: error: variable `r` is declared twice
             f.aggl:12:54: error: no variable `n` on the left side or among the parameters (did you mean `p`?)
-            f.aggl:12:63: error: < takes numbers, not text
+            f.aggl:12:71: error: < takes numbers, not text
             f.aggl:13:17: error: `q` is deleted by this rule (keep the node on the right side, or leave the effect out)
+            f.aggl:13:40: error: + takes numbers, not a truth value
             f.aggl:13:55: error: variable `p` is declared twice
             f.aggl:13:71: error: no variable `z` in this rule (did you mean `n`?)"#]],
     );
@@ -200,6 +209,11 @@ visit : active(2)
 again : active(2) { go as x where: x.r = x.a }
 ",
         &expect![[r#"
+            f.aggl:7:2: error: no rule `goo` (did you mean `go`?)
+            f.aggl:8:8: error: alias `one` is declared twice
+            f.aggl:10:14: warning: `one.r` is a `robot` and `one.a` a `room`: never the same node
+            f.aggl:11:2: error: no alias `tow` (did you mean `two`?)
+            f.aggl:11:14: error: no variable `robot` in the rule of this step
             f.aggl:13:1: error: expected `=` and another `alias.variable`, found `}`
             f.aggl:14:44: warning: `x.r` is a `robot` and `x.a` a `room`: never the same node"#]],
     );
@@ -214,9 +228,7 @@ two : active(1) { { a:t } => { a:t }
 three : active(1) { { a:t } => { a:t } }
 four : active(1) { { a:t => { a:t } }",
         &expect![[r#"
-            f.aggl:3:45: error: `{` is never closed
             f.aggl:3:47: error: `(` is never closed
-            f.aggl:3:66: error: expected `}` at the end of the rule, found the next rule
             f.aggl:4:37: error: expected `}` at the end of the rule, found the next rule
             f.aggl:6:20: error: `{` is never closed"#]],
     );
@@ -228,7 +240,10 @@ fn a_stray_bracket_is_reported_and_the_rule_is_kept() {
                 (not (cold a a)))\n) } }\n";
     let (grammar, diagnostics) = parse_grammar(text, "f.aggl");
     assert_eq!(grammar.rules.len(), 1);
-    expect!["f.aggl:6:1: error: `)` closes nothing (remove it, or look for a missing opening bracket)"].assert_eq(&Defects { diagnostics }.to_string());
+    expect![
+        "f.aggl:6:1: error: `)` closes nothing (remove it, or look for a missing opening bracket)"
+    ]
+    .assert_eq(&Defects { diagnostics }.to_string());
 }
 
 #[test]
@@ -281,7 +296,8 @@ fn included_files_are_read_once_and_missing_ones_are_told() {
     // `nothere` may be declared in the missing file.
     expect![[r#"
         main.aggl:4:9: error: cannot read the included file `gone.aggl`: no such file
-        base.aggl:4:23: error: no variable `y` on the left side (did you mean `x`?)"#]].assert_eq(&Defects { diagnostics }.to_string());
+        base.aggl:4:23: error: no variable `y` on the left side (did you mean `x`?)"#]]
+    .assert_eq(&Defects { diagnostics }.to_string());
     assert!(
         !grammar.to_string().contains("a : active"),
         "only the main file is printed"
@@ -308,7 +324,8 @@ fn a_diagnostic_underlines_its_place() {
             label at line 6, columns 4 to 8: here
         snippet line 7: 	=>
         diagnostic help: did you mean `robot`?
-    "#]].assert_eq(&shown);
+    "#]]
+    .assert_eq(&shown);
 }
 
 #[test]
@@ -331,9 +348,15 @@ fn goals_name_nodes_by_id_by_name_or_leave_them_open() {
         "g.aggt",
         &types,
     );
-    expect!["g.aggt:1:49: error: expected `precondition` or the end of the goal, found `x`"].assert_eq(&error.unwrap_err().to_string());
+    expect![[r#"
+        g.aggt:1:5: error: no type `robott` (did you mean `robot`?)
+        g.aggt:1:15: error: no variable `4` in this goal (did you mean `1`?)
+        g.aggt:1:21: error: a node's id must be a whole number below 2^64, not 99999999999999999999
+        g.aggt:1:49: error: expected `precondition` or the end of the goal, found `x`"#]]
+    .assert_eq(&error.unwrap_err().to_string());
     let error = parse_goal("{ 1:robott 1->4(in) }", "g.aggt", &types);
     expect![[r#"
         g.aggt:1:5: error: no type `robott` (did you mean `robot`?)
-        g.aggt:1:15: error: no variable `4` in this goal (did you mean `1`?)"#]].assert_eq(&error.unwrap_err().to_string());
+        g.aggt:1:15: error: no variable `4` in this goal (did you mean `1`?)"#]]
+    .assert_eq(&error.unwrap_err().to_string());
 }

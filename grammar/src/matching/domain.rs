@@ -77,6 +77,11 @@ impl Domain {
         self.types.binary_search(&exact).is_ok()
     }
 
+    /// The exact types, ascending.
+    pub(crate) fn types(&self) -> &[TypeId] {
+        &self.types
+    }
+
     /// How many nodes belong to it; where a type has several roots above it, more.
     pub(crate) fn count(&self, snapshot: &Snapshot) -> Result<u64, ReadError> {
         self.roots

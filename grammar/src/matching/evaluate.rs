@@ -3,7 +3,6 @@
 //! Guarantee: every formula has a truth value. A term that has no value (an attribute that is not
 //! there, a division by zero, an overflow) makes the comparison that it stands in not hold.
 
-use super::domain::Domain;
 use super::program::{Link, Slot, Term, Test};
 use crate::{Arithmetic, Comparison};
 use dsr::{EdgeKey, NodeId, ReadError, Snapshot, Value};
@@ -67,46 +66,20 @@ impl Test {
                 }
                 Ok(false)
             }
-            Self::Exists {
-                first,
-                domains,
-                body,
-            } => for_each_choice(snapshot, environment, *first, domains, &mut |environment| {
-                Ok(body.holds(snapshot, environment)?.then_some(()))
-            })
-            .map(|found| found.is_some()),
-            Self::Forall {
-                first,
-                domains,
-                body,
-            } => for_each_choice(snapshot, environment, *first, domains, &mut |environment| {
-                Ok((!body.holds(snapshot, environment)?).then_some(()))
-            })
-            .map(|counterexample| counterexample.is_none()),
+            Self::Exists(choices, body) => {
+                let mut found = |environment: &mut Environment| {
+                    Ok::<_, ReadError>(body.holds(snapshot, environment)?.then_some(()))
+                };
+                Ok(choices.each(snapshot, environment, &mut found)?.is_some())
+            }
+            Self::Forall(choices, body) => {
+                let mut refuted = |environment: &mut Environment| {
+                    Ok::<_, ReadError>((!body.holds(snapshot, environment)?).then_some(()))
+                };
+                Ok(choices.each(snapshot, environment, &mut refuted)?.is_none())
+            }
         }
     }
-}
-
-/// Puts every choice of nodes from the domains into the slots from `first` on, until `visit`
-/// gives something. The slots keep the choice that it gave something for.
-pub(crate) fn for_each_choice<T, E: From<ReadError>>(
-    snapshot: &Snapshot,
-    environment: &mut Environment,
-    first: usize,
-    domains: &[Domain],
-    visit: &mut impl FnMut(&mut Environment) -> Result<Option<T>, E>,
-) -> Result<Option<T>, E> {
-    let Some((domain, rest)) = domains.split_first() else {
-        return visit(environment);
-    };
-    for node in domain.nodes(snapshot) {
-        environment[first] = Slot::Node(node?);
-        let found = for_each_choice(snapshot, environment, first + 1, rest, visit)?;
-        if found.is_some() {
-            return Ok(found);
-        }
-    }
-    Ok(None)
 }
 
 impl Term {

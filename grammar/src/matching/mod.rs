@@ -2,6 +2,7 @@
 //!
 //! Guarantee: matching is injective and subtype-aware, and reads the snapshot in place.
 
+mod choice;
 mod domain;
 mod evaluate;
 mod obstacle;
@@ -12,6 +13,7 @@ mod search;
 pub use obstacle::{End, Obstacle};
 pub use search::Matches;
 
+pub(crate) use choice::Choices;
 pub(crate) use domain::Domain as MatchDomain;
 pub(crate) use evaluate::{Environment, Number, compare};
 pub(crate) use obstacle::words;

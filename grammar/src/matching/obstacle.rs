@@ -2,7 +2,7 @@
 //!
 //! Guarantee: an obstacle is given exactly where the rule does not match.
 
-use super::evaluate::{Environment, for_each_choice, is_there, node};
+use super::evaluate::{Environment, is_there, node};
 use super::program::{Compiler, Slot};
 use super::{MatchError, Problem, conjuncts};
 use crate::{AttributePath, Condition, Expression, Grammar, Name, PatternEdge, PatternNode};
@@ -289,21 +289,17 @@ impl Words<'_, '_> {
             Condition::Or(_) => format!("nothing of {formula} holds"),
             Condition::Exists { .. } => format!("{formula} does not hold"),
             Condition::Forall { variables, body } => {
-                let (first, domains) = self.compiler.quantify(variables);
-                let slots = self.compiler.slots();
-                self.environment
-                    .resize(slots.max(self.environment.len()), Slot::Unbound);
+                let outer = self.compiler.scope();
+                let choices = self.compiler.quantify(variables);
                 let test = self.compiler.test(body)?;
-                let slots = self.compiler.slots();
-                self.environment
-                    .resize(slots.max(self.environment.len()), Slot::Unbound);
+                let slots = self.compiler.slots().max(self.environment.len());
+                self.environment.resize(slots, Slot::Unbound);
                 let snapshot = self.snapshot;
                 let mut fails = |environment: &mut Environment| {
                     let holds = test.holds(snapshot, environment)?;
                     Ok::<_, MatchError>((!holds).then_some(()))
                 };
-                let counterexample =
-                    for_each_choice(snapshot, self.environment, first, &domains, &mut fails)?;
+                let counterexample = choices.each(snapshot, self.environment, &mut fails)?;
                 let explained = match counterexample {
                     Some(()) => {
                         let who: Vec<String> = variables
@@ -315,7 +311,7 @@ impl Words<'_, '_> {
                     }
                     None => None,
                 };
-                self.compiler.leave(first);
+                self.compiler.leave(outer);
                 match explained {
                     Some(explained) => return Ok(explained),
                     None => format!("{formula} does not hold"),

@@ -4,8 +4,9 @@
 //! tested at the first step after which all that it reads is bound.
 
 use super::domain::Domain;
-use super::program::{Link, Test};
-use dsr::{ReadError, Snapshot};
+use super::evaluate::node;
+use super::program::{Link, Slot, Test};
+use dsr::{NodeId, ReadError, Snapshot};
 
 /// How a step finds candidates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,26 +46,27 @@ impl Source {
 }
 
 /// Orders the steps: each time the source that is expected to give the fewest candidates, by the
-/// snapshot's own counts of nodes per type and of edges per label.
+/// snapshot's own counts of nodes per type and of edges per label, and by how many links some
+/// nodes have.
 pub(crate) fn plan(
     snapshot: &Snapshot,
     domains: &[Domain],
     links: &[Link],
     tests: &[Test],
-    bound: &[usize],
+    environment: &[Slot],
 ) -> Result<Vec<Step>, ReadError> {
-    let counts = domains
-        .iter()
-        .map(|domain| Ok(domain.count(snapshot)? as f64))
-        .collect::<Result<Vec<_>, ReadError>>()?;
-    let edges = links
-        .iter()
-        .map(|link| Ok(link.label.map_or(Ok(0), |l| snapshot.count_of_label(l))? as f64))
-        .collect::<Result<Vec<_>, ReadError>>()?;
-    let mut bound = bound.to_vec();
+    let mut bound: Vec<usize> = (0..domains.len())
+        .filter(|&slot| node(environment, slot).is_some())
+        .collect();
+    let estimates = Estimates {
+        snapshot,
+        domains,
+        links,
+        environment,
+    };
     let mut steps = Vec::new();
     while bound.len() < domains.len() {
-        let Some(source) = cheapest(&counts, &edges, links, &bound) else {
+        let Some(source) = estimates.cheapest(&bound)? else {
             break;
         };
         let before = bound.clone();
@@ -98,40 +100,78 @@ pub(crate) fn plan(
     Ok(steps)
 }
 
-fn cheapest(counts: &[f64], edges: &[f64], links: &[Link], bound: &[usize]) -> Option<Source> {
-    let is_bound = |slot: usize| bound.contains(&slot);
-    let mut best: Option<(f64, Source)> = None;
-    let mut offer = |expected: f64, source: Source| {
-        if best.is_none_or(|(least, _)| expected < least) {
-            best = Some((expected, source));
+/// How many nodes of a type, and edges of each, are looked at to guess what is typical.
+const SAMPLE: (usize, usize) = (8, 64);
+
+/// What the snapshot says about how many candidates a source gives.
+struct Estimates<'a> {
+    snapshot: &'a Snapshot,
+    domains: &'a [Domain],
+    links: &'a [Link],
+    environment: &'a [Slot],
+}
+
+impl Estimates<'_> {
+    fn cheapest(&self, bound: &[usize]) -> Result<Option<Source>, ReadError> {
+        let is_bound = |slot: usize| bound.contains(&slot);
+        let mut best: Option<(f64, Source)> = None;
+        let mut offer = |expected: f64, source: Source| {
+            if best.is_none_or(|(least, _)| expected < least) {
+                best = Some((expected, source));
+            }
+        };
+        for (index, link) in self
+            .links
+            .iter()
+            .enumerate()
+            .filter(|(_, link)| !link.negated)
+        {
+            match (is_bound(link.from), is_bound(link.to)) {
+                (true, false) => offer(self.degree(link, true)?, Source::Out { link: index }),
+                (false, true) => offer(self.degree(link, false)?, Source::In { link: index }),
+                (false, false) if link.from != link.to => {
+                    let edges = link.label.map(|label| self.snapshot.count_of_label(label));
+                    let edges = edges.transpose()?.unwrap_or(0);
+                    offer(edges as f64, Source::Edges { link: index });
+                }
+                _ => {}
+            }
         }
-    };
-    for (index, link) in links.iter().enumerate().filter(|(_, link)| !link.negated) {
-        match (is_bound(link.from), is_bound(link.to)) {
-            (true, false) => {
-                offer(
-                    edges[index] / counts[link.from].max(1.0),
-                    Source::Out { link: index },
-                );
-            }
-            (false, true) => {
-                offer(
-                    edges[index] / counts[link.to].max(1.0),
-                    Source::In { link: index },
-                );
-            }
-            (false, false) if link.from != link.to => {
-                offer(edges[index], Source::Edges { link: index });
-            }
-            _ => {}
+        for (slot, domain) in self
+            .domains
+            .iter()
+            .enumerate()
+            .filter(|(slot, _)| !is_bound(*slot))
+        {
+            offer(domain.count(self.snapshot)? as f64, Source::Nodes { slot });
         }
+        Ok(best.map(|(_, source)| source))
     }
-    for (slot, &count) in counts
-        .iter()
-        .enumerate()
-        .filter(|(slot, _)| !is_bound(*slot))
-    {
-        offer(count, Source::Nodes { slot });
+
+    /// How many links like this leave (or enter) a node of its bound end. The count of the label
+    /// alone would not do: one robot is `in` a room, and so are thousands of persons.
+    fn degree(&self, link: &Link, outwards: bool) -> Result<f64, ReadError> {
+        let Some(label) = link.label else {
+            return Ok(0.0);
+        };
+        let slot = if outwards { link.from } else { link.to };
+        let sample: Vec<NodeId> = match node(self.environment, slot) {
+            Some(id) => vec![id],
+            None => self.domains[slot]
+                .nodes(self.snapshot)
+                .take(SAMPLE.0)
+                .collect::<Result<_, _>>()?,
+        };
+        let mut edges = 0;
+        for &id in &sample {
+            if let Some(found) = self.snapshot.find_node(id)? {
+                edges += if outwards {
+                    found.out_edges_of(label).take(SAMPLE.1).count()
+                } else {
+                    found.in_edges_of(label).take(SAMPLE.1).count()
+                };
+            }
+        }
+        Ok(edges as f64 / sample.len().max(1) as f64)
     }
-    best.map(|(_, source)| source)
 }

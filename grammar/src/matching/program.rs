@@ -4,6 +4,7 @@
 //! the schema does not have is no error, but is never found in the graph.
 
 use super::MatchError;
+use super::choice::Choices;
 use super::domain::Domain;
 use crate::{
     Arithmetic, AttributePath, Comparison, Condition, Expression, Literal, Name, PatternEdge,
@@ -48,17 +49,8 @@ pub(crate) enum Test {
     Not(Box<Test>),
     All(Vec<Test>),
     Any(Vec<Test>),
-    /// Slots from `first` on take every choice from the domains.
-    Exists {
-        first: usize,
-        domains: Vec<Domain>,
-        body: Box<Test>,
-    },
-    Forall {
-        first: usize,
-        domains: Vec<Domain>,
-        body: Box<Test>,
-    },
+    Exists(Choices, Box<Test>),
+    Forall(Choices, Box<Test>),
 }
 
 /// A compiled expression.
@@ -136,15 +128,17 @@ impl<'a> Compiler<'a> {
         })
     }
 
-    /// Declares quantified variables. Gives the first slot and the domains.
-    pub(crate) fn quantify(&mut self, variables: &[PatternNode]) -> (usize, Vec<Domain>) {
+    /// Declares quantified variables.
+    pub(crate) fn quantify(&mut self, variables: &[PatternNode]) -> Choices {
         let first = self.names.len();
-        let domains = variables.iter().map(|variable| {
-            self.declare(&variable.variable);
-            Domain::new(self.types, self.schema, &variable.type_name)
-        });
-        let domains = domains.collect();
-        (first, domains)
+        let domains: Vec<Domain> = variables
+            .iter()
+            .map(|variable| {
+                self.declare(&variable.variable);
+                self.domain(&variable.type_name)
+            })
+            .collect();
+        Choices::new(first, domains)
     }
 
     pub(crate) fn test(&mut self, condition: &Condition) -> Result<Test, MatchError> {
@@ -160,24 +154,12 @@ impl<'a> Compiler<'a> {
             Condition::And(all) => Test::All(self.tests(all)?),
             Condition::Or(any) => Test::Any(self.tests(any)?),
             Condition::Exists { variables, body } => {
-                let (first, domains) = self.quantify(variables);
-                let body = self.test(body);
-                self.leave(first);
-                Test::Exists {
-                    first,
-                    domains,
-                    body: Box::new(body?),
-                }
+                let (choices, body) = self.quantified(variables, body, true)?;
+                Test::Exists(choices, Box::new(body))
             }
             Condition::Forall { variables, body } => {
-                let (first, domains) = self.quantify(variables);
-                let body = self.test(body);
-                self.leave(first);
-                Test::Forall {
-                    first,
-                    domains,
-                    body: Box::new(body?),
-                }
+                let (choices, body) = self.quantified(variables, body, false)?;
+                Test::Forall(choices, Box::new(body))
             }
             Condition::When {
                 condition,
@@ -187,6 +169,22 @@ impl<'a> Compiler<'a> {
                 Test::Any(vec![unless, self.test(consequence)?])
             }
         })
+    }
+
+    /// A quantified formula, and the choices at which it can come out as `outcome`.
+    fn quantified(
+        &mut self,
+        variables: &[PatternNode],
+        body: &Condition,
+        outcome: bool,
+    ) -> Result<(Choices, Test), MatchError> {
+        let outer = self.scope();
+        let mut choices = self.quantify(variables);
+        let body = self.test(body);
+        self.leave(outer);
+        let body = body?;
+        choices.narrow(&body, outcome);
+        Ok((choices, body))
     }
 
     fn tests(&mut self, conditions: &[Condition]) -> Result<Vec<Test>, MatchError> {
@@ -241,7 +239,7 @@ impl Test {
             Self::Compare(_, left, right) => left.reads(slot) || right.reads(slot),
             Self::Not(inner) => inner.reads(slot),
             Self::All(tests) | Self::Any(tests) => tests.iter().any(|test| test.reads(slot)),
-            Self::Exists { body, .. } | Self::Forall { body, .. } => body.reads(slot),
+            Self::Exists(_, body) | Self::Forall(_, body) => body.reads(slot),
         }
     }
 }

@@ -67,7 +67,7 @@ impl<'a> Matches<'a> {
             tests,
             ..
         } = &problem;
-        let steps = plan(snapshot, domains, links, tests, &given)?;
+        let steps = plan(snapshot, domains, links, tests, &problem.environment)?;
         let mut matches = Self {
             snapshot,
             problem,
@@ -206,6 +206,12 @@ impl<'a> Matches<'a> {
             }
         }
         Ok(true)
+    }
+
+    /// Where each step of the plan finds its candidates.
+    #[cfg(test)]
+    pub(super) fn sources(&self) -> impl Iterator<Item = String> {
+        self.steps.iter().map(|step| format!("{:?}", step.source))
     }
 
     fn advance(&mut self) -> Result<Option<Binding>, ReadError> {

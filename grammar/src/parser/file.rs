@@ -2,7 +2,7 @@
 //!
 //! Guarantee: everything between two readable items is either part of one or reported.
 
-use super::rule::Action;
+use super::rule::{Action, Broken};
 use super::{Finding, NodeNames, Parser};
 use crate::lexer::TokenKind;
 use crate::{Combo, Include, Name, Problem, Property, Rule, Span, TypeDeclaration, Types};
@@ -14,8 +14,8 @@ pub(crate) struct ParsedFile {
     pub(crate) types: Types,
     pub(crate) items: Vec<Item>,
     pub(crate) comments: Vec<String>,
-    /// Names of rules and combos that are there but could not be read.
-    pub(crate) broken: Vec<Name>,
+    /// Rules and combos with errors in them.
+    pub(crate) broken: Vec<Broken>,
     pub(crate) findings: Vec<Finding>,
 }
 
@@ -79,7 +79,7 @@ fn header(text: &str, file: u32, parsed: &mut ParsedFile) -> usize {
         }
         let problem = Problem::Expected {
             expected: "`key = value` or `===`".to_owned(),
-            found: "something else".to_owned(),
+            found: format!("`{content}`"),
             suggestion: None,
         };
         parsed.findings.push(Finding {
@@ -132,15 +132,15 @@ impl Parser<'_> {
                 let end = self.tokens[self.at.saturating_sub(1)].range.end;
                 let comments = self.comments_before(end);
                 match action {
-                    Action::Rule(mut rule) => {
+                    Ok(Action::Rule(mut rule)) => {
                         rule.comments = comments;
                         parsed.items.push(Item::Rule(rule));
                     }
-                    Action::Combo(mut combo) => {
+                    Ok(Action::Combo(mut combo)) => {
                         combo.comments = comments;
                         parsed.items.push(Item::Combo(combo));
                     }
-                    Action::Broken(name) => parsed.broken.extend(name),
+                    Err(broken) => parsed.broken.push(broken),
                 }
             } else if let TokenKind::Symbol(symbol @ ("===" | "}" | ")")) = token.kind {
                 self.bump();
@@ -194,7 +194,7 @@ impl Parser<'_> {
                 break;
             }
             if self.peek().is_none() || self.is_symbol("===") || self.is_symbol("{") {
-                self.report(opening.clone(), Problem::Unclosed { opening: '{' });
+                self.unclosed(opening.clone(), '{');
                 break;
             }
             let before = self.at;

@@ -39,7 +39,7 @@ impl Parser<'_> {
                 return forms;
             }
             if self.peek().is_none() || self.is_symbol("{") || self.at_section() {
-                self.report(opening, Problem::Unclosed { opening: '{' });
+                self.unclosed(opening, '{');
                 return forms;
             }
             if self.is_symbol(")") {
@@ -108,7 +108,7 @@ impl Parser<'_> {
         let mut whole = true;
         while !self.is_symbol(")") {
             if self.peek().is_none() || self.is_symbol("{") || self.is_symbol("}") {
-                self.report(opening, Problem::Unclosed { opening: '(' });
+                self.unclosed(opening, '(');
                 return None;
             }
             match self.form(depth + 1) {

@@ -23,10 +23,7 @@ impl Parser<'_> {
     /// After `precondition {`. Several formulas side by side must all hold.
     pub(super) fn condition_block(&mut self, opening: Range<usize>) -> Option<Condition> {
         let forms = self.forms(opening);
-        let mut conditions: Vec<Condition> = forms
-            .into_iter()
-            .filter_map(|form| self.condition(form))
-            .collect();
+        let mut conditions = self.conditions(forms);
         if conditions.len() > 1 {
             return Some(Condition::And(conditions));
         }
@@ -53,7 +50,11 @@ impl Parser<'_> {
                 self.wanted(span, what, None);
                 None
             }
-            1 => self.expression(items.remove(0)),
+            1 => {
+                let item = items.remove(0);
+                self.number_wanted(&item, "this");
+                self.expression(item)
+            }
             _ => self.expression(Form::List(items, span)),
         }
     }
@@ -100,8 +101,8 @@ impl Parser<'_> {
                 let [inner] = self.exactly(items, span, "one condition after `not`")?;
                 Some(Condition::Not(Box::new(self.condition(inner)?)))
             }
-            "and" => self.conditions(items).map(Condition::And),
-            "or" => self.conditions(items).map(Condition::Or),
+            "and" => Some(Condition::And(self.conditions(items))),
+            "or" => Some(Condition::Or(self.conditions(items))),
             "exists" | "forall" => {
                 let (variables, mut rest) = self.variables(items, span)?;
                 let [body] = match rest.len() {
@@ -139,9 +140,17 @@ impl Parser<'_> {
         }
     }
 
-    fn conditions(&mut self, items: Vec<Form>) -> Option<Vec<Condition>> {
-        let read: Vec<_> = items.into_iter().map(|item| self.condition(item)).collect();
-        read.into_iter().collect()
+    /// Those of the conditions that can be read.
+    fn conditions(&mut self, forms: Vec<Form>) -> Vec<Condition> {
+        let mut conditions = Vec::new();
+        for form in forms {
+            let span = form.span();
+            match self.condition(form) {
+                Some(condition) => conditions.push(condition),
+                None => self.lose_span(span),
+            }
+        }
+        conditions
     }
 
     /// `=` and `!=` of two nodes compare the nodes; all else compares values.
@@ -167,6 +176,10 @@ impl Parser<'_> {
                 _ => Condition::Not(Box::new(same)),
             });
         }
+        if !matches!(operator, Comparison::Equal | Comparison::NotEqual) {
+            self.number_wanted(&left, operator.symbol());
+            self.number_wanted(&right, operator.symbol());
+        }
         let left = self.expression(left);
         let right = self.expression(right)?;
         Some(Condition::Compare {
@@ -179,7 +192,10 @@ impl Parser<'_> {
     fn effects(&mut self, forms: Vec<Form>) -> Vec<Effect> {
         let mut effects = Vec::new();
         for form in forms {
-            self.effect(form, &mut effects);
+            let span = form.span();
+            if self.effect(form, &mut effects).is_none() {
+                self.lose_span(span);
+            }
         }
         effects
     }
@@ -281,6 +297,9 @@ impl Parser<'_> {
                     self.wanted(span, "more operands", None);
                     return None;
                 }
+                for item in &items {
+                    self.number_wanted(item, operator.symbol());
+                }
                 let read: Vec<_> = items
                     .into_iter()
                     .map(|item| self.expression(item))
@@ -297,6 +316,24 @@ impl Parser<'_> {
                 None
             }
         }
+    }
+
+    /// Reports an operand that can only be text or a truth value.
+    fn number_wanted(&mut self, form: &Form, operator: &'static str) {
+        let found = match form {
+            Form::Text(_) => "text",
+            Form::Word(word) if word == "true" || word == "false" => "a truth value",
+            _ => return,
+        };
+        let (span, expected) = (form.span(), "numbers");
+        self.report(
+            span.start..span.end,
+            Problem::WrongOperand {
+                operator,
+                expected,
+                found,
+            },
+        );
     }
 
     fn exactly<const N: usize>(

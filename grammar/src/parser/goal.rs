@@ -4,14 +4,35 @@
 
 use super::{Finding, NodeNames, Parser};
 use crate::lexer::unquote;
-use crate::{Constant, Goal, Problem};
+use crate::{Constant, Goal, Name, Problem};
 
-/// Reads a goal. `None` if it cannot be used.
-pub(crate) fn parse_goal_file(text: &str) -> (Option<Goal>, Vec<Finding>) {
+/// A goal file as far as it could be read.
+#[derive(Debug)]
+pub(crate) struct ParsedGoal {
+    /// For checking only if something is `broken`.
+    pub(crate) goal: Option<Goal>,
+    pub(crate) broken: bool,
+    /// Words in the parts that could not be read.
+    pub(crate) lost: Vec<Name>,
+    pub(crate) findings: Vec<Finding>,
+}
+
+/// Reads a goal.
+pub(crate) fn parse_goal_file(text: &str) -> ParsedGoal {
     let mut parser = Parser::new(text, 0, 0, NodeNames::Goal);
     let goal = parser.goal();
-    let usable = parser.fatal == 0;
-    (goal.filter(|_| usable), parser.findings)
+    let Parser {
+        fatal,
+        lost,
+        findings,
+        ..
+    } = parser;
+    ParsedGoal {
+        goal,
+        broken: fatal > 0,
+        lost,
+        findings,
+    }
 }
 
 impl Parser<'_> {
@@ -23,12 +44,12 @@ impl Parser<'_> {
         };
         if self.is_word("precondition") {
             self.bump();
-            let opening = self.expect("{", "`{`")?;
-            goal.precondition = self.condition_block(opening);
+            if let Some(opening) = self.expect("{", "`{`") {
+                goal.precondition = self.condition_block(opening);
+            }
         }
         if self.peek().is_some() {
             self.expected("`precondition` or the end of the goal", &["precondition"]);
-            return None;
         }
         for node in &goal.pattern.nodes {
             let variable = &node.variable;

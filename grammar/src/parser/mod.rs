@@ -11,7 +11,8 @@ mod pattern;
 mod rule;
 
 pub(crate) use file::{Item, ParsedFile, parse_file};
-pub(crate) use goal::parse_goal_file;
+pub(crate) use goal::{ParsedGoal, parse_goal_file};
+pub(crate) use rule::{Action, Broken};
 
 use crate::lexer::{Lexed, Token, TokenKind, lex, quote, unquote};
 use crate::{Name, Problem, Span};
@@ -56,6 +57,10 @@ struct Parser<'a> {
     comments: Vec<(usize, String)>,
     /// Findings after which an item cannot be used.
     fatal: usize,
+    /// Words in parts of the current item that could not be read.
+    lost: Vec<Name>,
+    /// Where it was last reported that tokens ran out.
+    end_reported: Option<usize>,
 }
 
 impl<'a> Parser<'a> {
@@ -77,6 +82,8 @@ impl<'a> Parser<'a> {
             findings: Vec::new(),
             comments,
             fatal: 0,
+            lost: Vec::new(),
+            end_reported: None,
         };
         for (range, problem) in problems {
             parser.report(range, problem);
@@ -101,7 +108,8 @@ impl<'a> Parser<'a> {
         problem: Problem,
         related: Option<(Span, String)>,
     ) {
-        self.fatal += usize::from(!matches!(problem, Problem::Stray(_)));
+        let readable = matches!(problem, Problem::Stray(_) | Problem::WrongOperand { .. });
+        self.fatal += usize::from(!readable);
         let span = self.span(range);
         self.findings.push(Finding {
             span,
@@ -118,6 +126,9 @@ impl<'a> Parser<'a> {
             }
             _ => None,
         };
+        if !self.end_is_news() {
+            return;
+        }
         let (range, found) = self.found();
         self.report(
             range,
@@ -127,6 +138,48 @@ impl<'a> Parser<'a> {
                 suggestion,
             },
         );
+    }
+
+    /// Reports that a bracket has no partner.
+    fn unclosed(&mut self, range: Range<usize>, opening: char) {
+        if self.end_is_news() {
+            self.report(range, Problem::Unclosed { opening });
+        }
+    }
+
+    /// Whether it was not yet reported that the tokens ran out here, if they did. One report is
+    /// enough: what encloses the innermost open bracket is open, too.
+    fn end_is_news(&mut self) -> bool {
+        if self.peek().is_some() {
+            return true;
+        }
+        self.fatal += 1;
+        self.end_reported.replace(self.at) != Some(self.at)
+    }
+
+    /// Remembers the words among these tokens as lost.
+    fn lose(&mut self, tokens: Range<usize>) {
+        for at in tokens {
+            let Some(token) = self.tokens.get(at) else {
+                break;
+            };
+            if matches!(token.kind, TokenKind::Word | TokenKind::Number) {
+                let text = &self.text[token.range.clone()];
+                self.lost
+                    .push(Name::new(text, self.span(token.range.clone())));
+            }
+        }
+    }
+
+    /// Remembers the words of a part of the file as lost.
+    fn lose_span(&mut self, span: Span) {
+        let first = self
+            .tokens
+            .partition_point(|token| token.range.start < span.start);
+        let end = self
+            .tokens
+            .partition_point(|token| token.range.start < span.end);
+        self.lose(first..end);
     }
 
     /// The current token's range and what it is, in words.
@@ -289,6 +342,7 @@ impl<'a> Parser<'a> {
             self.bump();
         }
         self.skip_line();
+        self.lose(start..self.at);
     }
 
     fn skip_line(&mut self) {

@@ -29,7 +29,7 @@ impl Parser<'_> {
                 self.skip_broken_line(before);
             }
         }
-        self.report(opening, crate::Problem::Unclosed { opening: '{' });
+        self.unclosed(opening, '{');
         Some(pattern)
     }
 

@@ -16,12 +16,21 @@ pub(super) const MODIFIERS: [&str; 3] = ["dormant", "hierarchical", "strict"];
 /// Words that may stand between a rule's cost and its body.
 const CLAUSES: [&str; 5] = ["success", "activates", "cost", "duration", "agent"];
 
-/// A rule or a combo, or the name of one that is broken.
+/// A rule or a combo.
 #[derive(Debug)]
-pub(super) enum Action {
+pub(crate) enum Action {
     Rule(Box<Rule>),
     Combo(Combo),
-    Broken(Option<Name>),
+}
+
+/// What was made of a rule or combo that has errors in it.
+#[derive(Debug)]
+pub(crate) struct Broken {
+    pub(crate) name: Option<Name>,
+    /// What could be read of it; for checking only.
+    pub(crate) action: Option<Action>,
+    /// Words in the parts that could not be read: they may have declared what the rest uses.
+    pub(crate) lost: Vec<Name>,
 }
 
 #[derive(Debug)]
@@ -37,6 +46,22 @@ struct Header {
     activates: Option<Vec<Name>>,
 }
 
+impl Header {
+    fn new(name: Name) -> Self {
+        Self {
+            name,
+            kind: Kind::Active,
+            constant_cost: Expression::Literal(Literal::Integer(1)),
+            cost: None,
+            duration: None,
+            agent: None,
+            success: None,
+            modifiers: Vec::new(),
+            activates: None,
+        }
+    }
+}
+
 #[derive(Debug, Default)]
 struct Sections {
     parameters: Option<Vec<PatternNode>>,
@@ -47,8 +72,9 @@ struct Sections {
 
 impl Parser<'_> {
     /// A rule or combo, from its first token to its end or the next rule's beginning.
-    pub(super) fn action(&mut self) -> Action {
+    pub(super) fn action(&mut self) -> Result<Action, Broken> {
         let fatal = self.fatal;
+        self.lost.clear();
         let first = self.at;
         let next = self
             .beginnings
@@ -63,71 +89,86 @@ impl Parser<'_> {
             .find(|pair| pair[1].kind == TokenKind::Symbol(":"))
             .map(|pair| pair[0].range.clone())
             .map(|range| Name::new(&self.text[range.clone()], self.span(range)));
-        let header = self.header();
-        if header.is_none() {
+        let mut header = Header::new(name.clone().unwrap_or_default());
+        if self.header(&mut header).is_none() {
             while self.peek().is_some() && !self.is_symbol("{") {
                 self.bump();
             }
+            if self.peek().is_none() {
+                return Err(Broken {
+                    name,
+                    action: None,
+                    lost: Vec::new(),
+                });
+            }
         }
-        let action = self.body(header);
-        match action {
-            Some(action) if self.fatal == fatal => action,
-            _ => Action::Broken(name),
+        match self.body(header) {
+            Some(action) if self.fatal == fatal => Ok(action),
+            action => Err(Broken {
+                name,
+                action,
+                lost: std::mem::take(&mut self.lost),
+            }),
         }
     }
 
-    fn header(&mut self) -> Option<Header> {
-        let mut modifiers = Vec::new();
+    fn header(&mut self, header: &mut Header) -> Option<()> {
         while MODIFIERS.contains(&self.token_text(self.at)) && !self.is_symbol_at(self.at + 1, ":")
         {
             let modifier = self.bump_name();
-            if modifiers.contains(&modifier) {
-                self.repeated(
-                    modifier.span().start..modifier.span().end,
-                    format!("`{modifier}`"),
-                );
+            if header.modifiers.contains(&modifier) {
+                let span = modifier.span();
+                self.repeated(span.start..span.end, format!("`{modifier}`"));
             }
-            modifiers.push(modifier);
+            header.modifiers.push(modifier);
         }
-        if self.tokens[..self.limit]
-            .get(self.at + 1)
-            .is_some_and(|t| t.kind == TokenKind::Word)
-        {
-            self.expected(
-                "`dormant`, `hierarchical`, `strict` or a rule's name",
-                &MODIFIERS,
-            );
+        let after = self.tokens[..self.limit].get(self.at + 1);
+        if after.is_some_and(|token| token.kind == TokenKind::Word) {
+            let expected = "`dormant`, `hierarchical`, `strict` or a rule's name";
+            self.expected(expected, &MODIFIERS);
             return None;
         }
-        let name = self.name("a rule's name")?;
+        header.name = self.name("a rule's name")?;
         self.expect(":", "`:` after the rule's name")?;
-        let kind = match self.token_text(self.at) {
-            "active" => Kind::Active,
-            "passive" => Kind::Passive,
+        match self.token_text(self.at) {
+            "active" => header.kind = Kind::Active,
+            "passive" => header.kind = Kind::Passive,
             _ => {
                 self.expected("`active` or `passive`", &["active", "passive"]);
                 return None;
             }
-        };
-        self.bump();
-        self.expect("(", "`(` and the rule's cost")?;
-        let cost = self.not_negative("the cost")?;
-        self.expect(")", "`)` after the cost")?;
-        let mut header = Header {
-            name,
-            kind,
-            constant_cost: cost,
-            cost: None,
-            duration: None,
-            agent: None,
-            success: None,
-            modifiers,
-            activates: None,
-        };
-        while !self.is_symbol("{") {
-            self.clause(&mut header)?;
         }
-        Some(header)
+        self.bump();
+        if self.constant_cost(header).is_none() {
+            self.skip_clause();
+        }
+        while !self.is_symbol("{") {
+            if self.peek().is_none() {
+                self.expected("`{` and the rule's body", &[]);
+                return None;
+            }
+            if self.clause(header).is_none() {
+                self.skip_clause();
+            }
+        }
+        Some(())
+    }
+
+    fn constant_cost(&mut self, header: &mut Header) -> Option<()> {
+        self.expect("(", "`(` and the rule's cost")?;
+        header.constant_cost = self.not_negative("the cost")?;
+        self.expect(")", "`)` after the cost")?;
+        Some(())
+    }
+
+    /// After a broken clause: skips to the next one or to the body.
+    fn skip_clause(&mut self) {
+        while self.peek().is_some() && !self.is_symbol("{") {
+            self.bump();
+            if CLAUSES.contains(&self.token_text(self.at)) && self.is_symbol_at(self.at + 1, "(") {
+                break;
+            }
+        }
     }
 
     fn clause(&mut self, header: &mut Header) -> Option<()> {
@@ -201,7 +242,7 @@ impl Parser<'_> {
         self.report(range, Problem::Repeated { what });
     }
 
-    fn body(&mut self, header: Option<Header>) -> Option<Action> {
+    fn body(&mut self, header: Header) -> Option<Action> {
         let opening = self.expect("{", "`{` and the rule's body")?;
         let word = self
             .peek()
@@ -213,7 +254,7 @@ impl Parser<'_> {
             self.skip_braces(1);
             return None;
         };
-        let arrow = self.expect("=>", "`=>` between the two sides");
+        self.expect("=>", "`=>` between the two sides");
         let Some(right) = self.graph("`{` and the right side") else {
             self.skip_braces(1);
             return None;
@@ -221,10 +262,8 @@ impl Parser<'_> {
         let sections = self.sections();
         if self.expect("}", "`}` at the end of the rule").is_none() {
             self.skip_braces(1);
-            return None;
         }
-        arrow?;
-        Some(Action::Rule(Box::new(rule(header?, left, right, sections))))
+        Some(Action::Rule(Box::new(rule(header, left, right, sections))))
     }
 
     fn sections(&mut self) -> Sections {
@@ -236,10 +275,12 @@ impl Parser<'_> {
             let word = self.token_text(self.at);
             if !SECTIONS.contains(&word) {
                 self.expected("`parameters`, `precondition`, `effect` or `}`", &SECTIONS);
+                let start = self.at;
                 self.bump();
                 if self.eat("{") {
                     self.skip_braces(1);
                 }
+                self.lose(start..self.at);
                 continue;
             }
             let range = self.bump();
@@ -272,7 +313,7 @@ impl Parser<'_> {
         let mut parameters = Vec::new();
         while !self.eat("}") {
             if self.peek().is_none() || self.is_symbol("{") || self.at_section() {
-                self.report(opening, Problem::Unclosed { opening: '{' });
+                self.unclosed(opening, '{');
                 break;
             }
             let before = self.at;
@@ -293,13 +334,13 @@ impl Parser<'_> {
         Some(parameter)
     }
 
-    fn combo_body(&mut self, header: Option<Header>, opening: Range<usize>) -> Option<Action> {
+    fn combo_body(&mut self, header: Header, opening: Range<usize>) -> Option<Action> {
         let mut steps = Vec::new();
         let mut equalities = Vec::new();
         let mut where_seen = false;
         while !self.eat("}") {
             if self.peek().is_none() {
-                self.report(opening, Problem::Unclosed { opening: '{' });
+                self.unclosed(opening, '{');
                 return None;
             }
             let before = self.at;
@@ -319,7 +360,6 @@ impl Parser<'_> {
                 self.skip_broken_line(before);
             }
         }
-        let header = header?;
         let plain = header.cost.is_none()
             && header.duration.is_none()
             && header.agent.is_none()
@@ -327,16 +367,13 @@ impl Parser<'_> {
             && header.activates.is_none()
             && header.modifiers.is_empty();
         if !plain {
-            let (expected, found) = ("a combo rule without clauses or modifiers", "some");
             let span = header.name.span();
-            let (expected, found) = (expected.to_owned(), found.to_owned());
             let problem = Problem::Expected {
-                expected,
-                found,
+                expected: "a combo rule without clauses or modifiers".to_owned(),
+                found: "some".to_owned(),
                 suggestion: None,
             };
             self.report(span.start..span.end, problem);
-            return None;
         }
         Some(Action::Combo(Combo {
             name: header.name,

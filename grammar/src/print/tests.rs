@@ -1,4 +1,5 @@
 //! Printed text reads back as what was printed, whatever it was.
+#![allow(clippy::needless_raw_string_hashes, reason = "expect-test writes them")]
 
 use crate::testing::random::{AWKWARD, soup};
 use crate::testing::{CARE, read};
