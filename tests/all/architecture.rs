@@ -84,7 +84,7 @@ fn only_the_shells_touch_clock_disk_environment_and_threads() {
         CLOCKS
             .iter()
             .chain(&OUTSIDE)
-            .any(|touch| tree::names(program, touch))
+            .any(|touch| tree::names(&program, touch))
     };
     let found: Vec<&SourceFile> = sources
         .iter()

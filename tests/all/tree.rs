@@ -166,9 +166,13 @@ pub(crate) fn assert_none(what: &str, found: impl IntoIterator<Item = String>) {
 }
 
 /// Rust code without its unit tests, for what holds of the program only.
-pub(crate) fn program(code: &str) -> &str {
-    code.find("#[cfg(test)]\nmod tests {")
-        .map_or(code, |tests| &code[..tests])
+pub(crate) fn program(code: &str) -> String {
+    let Some((before, tests)) = code.split_once("#[cfg(test)]\nmod tests {") else {
+        return code.to_owned();
+    };
+    // As formatted, the first brace at the beginning of a line ends the module.
+    let after = tests.split_once("\n}\n").map_or("", |(_, after)| after);
+    format!("{before}{after}")
 }
 
 /// Whether `word` stands in the text as a word of its own.
