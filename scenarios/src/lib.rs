@@ -8,6 +8,7 @@
 
 mod initial_graph;
 pub mod metrics;
+pub mod picture;
 pub mod process;
 pub mod report;
 pub mod scenario;

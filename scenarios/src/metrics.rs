@@ -40,7 +40,7 @@ pub struct Metrics {
 /// How the robot moved.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RobotMetrics {
-    /// Sum of the distances from sample to sample, m (TD d_t).
+    /// Sum of the distances from sample to sample, m (TD `d_t`).
     pub path_length: f64,
     /// From the first sample to the last, s (TD tau).
     pub duration: f64,
@@ -61,7 +61,7 @@ pub struct RobotMetrics {
 pub struct PersonMetrics {
     /// Who.
     pub name: String,
-    /// Least distance of the centres, m (the papers' d_min; READING.md item 17).
+    /// Least distance of the centres, m (the papers' `d_min`; READING.md item 17).
     pub min_distance: f64,
     /// Least distance of the bodies' surfaces, m; 0 in contact.
     pub min_clearance: f64,

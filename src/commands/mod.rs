@@ -2,6 +2,7 @@
 
 mod agent;
 mod graph;
+mod output;
 mod run;
 mod store;
 
@@ -53,6 +54,16 @@ fn load_rules(scenario: &Scenario) -> Result<(Schema, Grammar), Failure> {
     let grammar = load_grammar(&scenario.rules, &scenario.folder.join("rules.aggl"))?;
     let schema = scenarios::schema().map_err(|error| Failure::Internal(error.into()))?;
     Ok((schema, grammar))
+}
+
+/// Whether every mission's goal can be read under the grammar's types.
+fn check_goals(scenario: &Scenario, grammar: &Grammar) -> Result<(), Failure> {
+    for mission in &scenario.missions {
+        let file = scenario.folder.join(&mission.file).display().to_string();
+        grammar::parse_goal(&mission.goal, &file, &grammar.types)
+            .map_err(|defects| Failure::Input(defects.into()))?;
+    }
+    Ok(())
 }
 
 /// A flag that the first Ctrl-C or termination request sets; the second ends the program at once.

@@ -90,7 +90,7 @@ fn the_table_compares_the_run_with_and_without_social_behaviour() {
             1,
         ),
     });
-    expect![[r#"
+    expect![[r"
         care-centre, seed 7: mission succeeded
 
                                                    social behaviour   no social behaviour
@@ -100,13 +100,13 @@ fn the_table_compares_the_run_with_and_without_social_behaviour() {
         heading changes (CHC, every 0.2 m)   rad               1.75                  1.75
         collisions (walls, objects, people)             0 (0, 0, 0)           1 (0, 0, 1)
         share of time in
-          somebody's intimate zone           %                  0.0                   4.2
+          intimate zone                      %                  0.0                   4.2
           personal zone                      %                  8.0                   1.0
           social zone                        %                 11.0                  12.4
           public space                       %                 81.0                  82.4
           space of an object in use          %                  1.6                  35.0
-        share of the time of moving (over 0.05 m/s) in
-          somebody's intimate zone           %                    -                     -
+        share of moving time (over 0.05 m/s) in
+          intimate zone                      %                    -                     -
           personal zone                      %                    -                     -
           social zone                        %                    -                     -
           public space                       %                    -                     -
@@ -115,7 +115,7 @@ fn the_table_compares_the_run_with_and_without_social_behaviour() {
           anna                               m          1.39 (0.94)           0.51 (0.06)
           ben                                m          2.14 (1.69)                     -
           cleo                               m                    -           4.00 (3.55)
-    "#]]
+    "]]
     .assert_eq(&report.table());
 }
 
@@ -135,7 +135,7 @@ fn a_crowd_is_cut_to_the_closest() {
         mission("visit", "failed", Some("anna left")),
         mission("return", "queued", None),
     ]);
-    expect![[r#"
+    expect![[r"
         care-centre, seed 7: mission visit failed: anna left
 
                                                    social behaviour
@@ -145,13 +145,13 @@ fn a_crowd_is_cut_to_the_closest() {
         heading changes (CHC, every 0.2 m)   rad               1.75
         collisions (walls, objects, people)             0 (0, 0, 0)
         share of time in
-          somebody's intimate zone           %                  0.0
+          intimate zone                      %                  0.0
           personal zone                      %                  0.0
           social zone                        %                  0.0
           public space                       %                100.0
           space of an object in use          %                    -
-        share of the time of moving (over 0.05 m/s) in
-          somebody's intimate zone           %                    -
+        share of moving time (over 0.05 m/s) in
+          intimate zone                      %                    -
           personal zone                      %                    -
           social zone                        %                    -
           public space                       %                    -
@@ -166,7 +166,7 @@ fn a_crowd_is_cut_to_the_closest() {
           walker_5                           m          3.75 (3.30)
           walker_4                           m          4.00 (3.55)
           and 4 more, none closer than 4.25 m
-    "#]]
+    "]]
     .assert_eq(&report.table());
 }
 
@@ -176,28 +176,28 @@ fn a_run_that_recorded_nothing_has_a_table_of_dashes() {
     report.metrics = Metrics::default();
     report.mission = None;
     report.social = false;
-    expect![[r#"
+    expect![[r"
         care-centre, seed 7: no mission
 
                                                    no social behaviour
-        mission                                              succeeded
+        mission                                                      -
         path length                          m                       -
         duration                             s                       -
         heading changes (CHC, every 0.2 m)   rad                     -
         collisions (walls, objects, people)                          -
         share of time in
-          somebody's intimate zone           %                       -
+          intimate zone                      %                       -
           personal zone                      %                       -
           social zone                        %                       -
           public space                       %                       -
           space of an object in use          %                       -
-        share of the time of moving (over 0.05 m/s) in
-          somebody's intimate zone           %                       -
+        share of moving time (over 0.05 m/s) in
+          intimate zone                      %                       -
           personal zone                      %                       -
           social zone                        %                       -
           public space                       %                       -
           space of an object in use          %                       -
-    "#]]
+    "]]
     .assert_eq(&report.table());
 }
 
