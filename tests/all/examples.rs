@@ -49,8 +49,8 @@ const MORE_TABLES: &str = r#"
 [robot.laser]
 [robot.localisation]
 [[wall]]
-from = [1.0, 2.0]
-to = [2.0, 2.0]
+from = [3.0, 0.2]
+to = [3.5, 0.2]
 [[stream]]
 name = "crowd"
 from = [1.0, 1.0]
