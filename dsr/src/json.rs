@@ -88,7 +88,13 @@ struct EdgeRow {
 pub fn value_to_json(value: &Value) -> Json {
     let typed = |json: Json| json!({"type": value.kind().name(), "value": json});
     // JSON has no word for these numbers.
-    let number = |x: f64| if x.is_finite() { json!(x) } else { json!(x.to_string()) };
+    let number = |x: f64| {
+        if x.is_finite() {
+            json!(x)
+        } else {
+            json!(x.to_string())
+        }
+    };
     match value {
         Value::Bool(b) => json!(b),
         Value::I64(n) => json!(n),
@@ -99,7 +105,9 @@ pub fn value_to_json(value: &Value) -> Json {
         Value::U32(n) => typed(json!(n)),
         Value::U64(n) => typed(json!(n.to_string())),
         Value::F32(x) => typed(number(f64::from(*x))),
-        Value::Vector(row) | Value::F64List(row) => typed(row.iter().copied().map(number).collect()),
+        Value::Vector(row) | Value::F64List(row) => {
+            typed(row.iter().copied().map(number).collect())
+        }
         Value::F32Vector(row) | Value::F32List(row) => {
             typed(row.iter().map(|&x| number(f64::from(x))).collect())
         }
@@ -139,7 +147,10 @@ pub fn value_from_json(json: &Json, expected: Option<ValueKind>) -> Result<Value
                 Json::Array(_) => Some(ValueKind::F64List),
                 _ => None,
             });
-            (plain.ok_or("null and untyped objects are no values")?, other)
+            (
+                plain.ok_or("null and untyped objects are no values")?,
+                other,
+            )
         }
     };
     decode(kind, json).ok_or_else(|| format!("{json} is not a {kind}"))
@@ -148,7 +159,12 @@ pub fn value_from_json(json: &Json, expected: Option<ValueKind>) -> Result<Value
 fn decode(kind: ValueKind, json: &Json) -> Option<Value> {
     let number = |json: &Json| json.as_f64().or_else(|| json.as_str()?.parse::<f64>().ok());
     let natural = |json: &Json| json.as_u64().or_else(|| json.as_str()?.parse::<u64>().ok());
-    let numbers = || json.as_array()?.iter().map(number).collect::<Option<Vec<_>>>();
+    let numbers = || {
+        json.as_array()?
+            .iter()
+            .map(number)
+            .collect::<Option<Vec<_>>>()
+    };
     let singles = || Some(numbers()?.into_iter().map(|x| x as f32).collect::<Vec<_>>());
     let six = |len: usize| (1..=6).contains(&len).then_some(());
     Some(match kind {
@@ -176,17 +192,22 @@ fn decode(kind: ValueKind, json: &Json) -> Option<Value> {
             let byte = |json: &Json| u8::try_from(json.as_u64()?).ok();
             Value::U8List(json.as_array()?.iter().map(byte).collect::<Option<_>>()?)
         }
-        ValueKind::U64List => {
-            Value::U64List(json.as_array()?.iter().map(natural).collect::<Option<_>>()?)
-        }
+        ValueKind::U64List => Value::U64List(
+            json.as_array()?
+                .iter()
+                .map(natural)
+                .collect::<Option<_>>()?,
+        ),
         ValueKind::Pose => {
             let row = |name: &str| {
                 let row = json.get(name)?.as_array()?.iter().map(Json::as_f64);
                 row.collect::<Option<Vec<_>>>()
             };
             let (translation, rotation) = (row("translation")?, row("rotation")?);
-            let (&[x, y, z], &[i, j, k, w]) =
-                (translation.first_chunk::<3>()?, rotation.first_chunk::<4>()?);
+            let (&[x, y, z], &[i, j, k, w]) = (
+                translation.first_chunk::<3>()?,
+                rotation.first_chunk::<4>()?,
+            );
             let quaternion = Quaternion::new(w, i, j, k);
             // Written by us it is of length one already, and stays what it was to the last bit.
             let rotation = if (quaternion.norm() - 1.0).abs() < 1e-12 {
@@ -207,7 +228,12 @@ pub fn to_json(snapshot: &Snapshot) -> Result<Json, ReadError> {
     let schema = snapshot.schema();
     let attributes = |list: Vec<crate::Attribute>| -> Map<String, Json> {
         list.iter()
-            .map(|a| (schema.attribute_name(a.name).to_owned(), value_to_json(&a.value)))
+            .map(|a| {
+                (
+                    schema.attribute_name(a.name).to_owned(),
+                    value_to_json(&a.value),
+                )
+            })
             .collect()
     };
     let (mut nodes, mut edges) = (Vec::new(), Vec::new());
@@ -221,7 +247,10 @@ pub fn to_json(snapshot: &Snapshot) -> Result<Json, ReadError> {
         });
         for key in node.out_edges() {
             let key = key?;
-            let found = snapshot.find_edge(key)?.map(|edge| edge.attributes()).transpose()?;
+            let found = snapshot
+                .find_edge(key)?
+                .map(|edge| edge.attributes())
+                .transpose()?;
             edges.push(EdgeRow {
                 from: End::Id(key.from.0),
                 label: schema.label_name(key.label).to_owned(),
@@ -235,7 +264,11 @@ pub fn to_json(snapshot: &Snapshot) -> Result<Json, ReadError> {
     edges.sort_by(|a, b| {
         (id(&a.from), &a.label, id(&a.to)).cmp(&(id(&b.from), &b.label, id(&b.to)))
     });
-    Ok(json!(File { format: FORMAT.to_owned(), nodes, edges }))
+    Ok(json!(File {
+        format: FORMAT.to_owned(),
+        nodes,
+        edges
+    }))
 }
 
 /// The transaction that makes, on an empty graph, what the graph JSON says.
@@ -252,9 +285,11 @@ pub fn from_json(text: &str) -> Result<Transaction, JsonError> {
         map.into_iter()
             .map(|(attribute, json)| match value_from_json(&json, None) {
                 Ok(value) => Ok((attribute, value)),
-                Err(reason) => {
-                    Err(JsonError::Attribute { owner: owner.to_owned(), attribute, reason })
-                }
+                Err(reason) => Err(JsonError::Attribute {
+                    owner: owner.to_owned(),
+                    attribute,
+                    reason,
+                }),
             })
             .collect::<Result<Vec<_>, _>>()
     };
@@ -270,16 +305,24 @@ pub fn from_json(text: &str) -> Result<Transaction, JsonError> {
     }
     for edge in file.edges {
         let end = |end: End| match end {
-            End::Id(id) if !known.contains(&id) => {
-                Err(JsonError::NoSuchNode { label: edge.label.clone(), node: id })
-            }
+            End::Id(id) if !known.contains(&id) => Err(JsonError::NoSuchNode {
+                label: edge.label.clone(),
+                node: id,
+            }),
             End::Id(id) => Ok(NodeId(id).into()),
             End::Name(name) => Ok(crate::NodeRef::Name(name)),
         };
         let (from, to) = (end(edge.from)?, end(edge.to)?);
-        let key = crate::EdgeRef { from, label: edge.label.clone(), to };
+        let key = crate::EdgeRef {
+            from,
+            label: edge.label.clone(),
+            to,
+        };
         let attributes = attributes(&key.to_string(), edge.attributes)?;
-        transaction.push(Operation::CreateEdge { edge: key, attributes });
+        transaction.push(Operation::CreateEdge {
+            edge: key,
+            attributes,
+        });
     }
     Ok(transaction)
 }
@@ -306,10 +349,18 @@ mod tests {
             {"id":2,"type":"robot","name":"shelly","attributes":{"id":{"type":"u64","value":"18446744073709551615"}}}],
             "edges":[{"from":2,"label":"in","to":7,"attributes":{"since":{"type":"f32_list","value":[0.5]}}}]}"#;
         let mut graph = Graph::in_memory(Schema::open());
-        graph.commit(&from_json(text).unwrap(), "test", Time::default()).unwrap();
+        graph
+            .commit(&from_json(text).unwrap(), "test", Time::default())
+            .unwrap();
         let once = to_json(&graph.snapshot()).unwrap();
         let mut again = Graph::in_memory(Schema::open());
-        again.commit(&from_json(&once.to_string()).unwrap(), "test", Time::default()).unwrap();
+        again
+            .commit(
+                &from_json(&once.to_string()).unwrap(),
+                "test",
+                Time::default(),
+            )
+            .unwrap();
         assert_eq!(to_json(&again.snapshot()).unwrap(), once);
         assert_eq!(once["nodes"][1]["attributes"]["area"].to_string(), "12.0");
     }
@@ -317,8 +368,14 @@ mod tests {
     #[test]
     fn broken_files_are_told_with_their_place() {
         let place = from_json("{\"format\":\"dsr/1\",\n\"nodes\":[{\"id\":1,").unwrap_err();
-        assert!(place.to_string().ends_with("at line 2 column 17"), "{place}");
+        assert!(
+            place.to_string().ends_with("at line 2 column 17"),
+            "{place}"
+        );
         let far = r#"{"format":"dsr/1","nodes":[],"edges":[{"from":1,"label":"in","to":2}]}"#;
-        assert!(matches!(from_json(far), Err(JsonError::NoSuchNode { node: 1, .. })));
+        assert!(matches!(
+            from_json(far),
+            Err(JsonError::NoSuchNode { node: 1, .. })
+        ));
     }
 }

@@ -75,18 +75,30 @@ impl Turns {
     pub fn begin(pace: Pace, stop: Arc<AtomicBool>) -> Result<Self, TurnError> {
         let (send, lines) = channel();
         if pace == Pace::Alone {
-            return Ok(Self { pace, lines, stop, taking: None });
+            return Ok(Self {
+                pace,
+                lines,
+                stop,
+                taking: None,
+            });
         }
-        std::thread::Builder::new().name("lifeline".to_owned()).spawn(move || {
-            for line in std::io::stdin().lock().lines() {
-                let Ok(line) = line else { return };
-                if send.send(line).is_err() {
-                    return;
+        std::thread::Builder::new()
+            .name("lifeline".to_owned())
+            .spawn(move || {
+                for line in std::io::stdin().lock().lines() {
+                    let Ok(line) = line else { return };
+                    if send.send(line).is_err() {
+                        return;
+                    }
                 }
-            }
-        })?;
+            })?;
         say("ready\n")?;
-        Ok(Self { pace, lines, stop, taking: None })
+        Ok(Self {
+            pace,
+            lines,
+            stop,
+            taking: None,
+        })
     }
 
     /// Waits for the next turn; `None` when the process shall end.
@@ -107,7 +119,9 @@ impl Turns {
                 if let Some(index) = self.taking.take() {
                     say(&done_line(index))?;
                 }
-                let Ok(line) = self.lines.recv() else { return Ok(None) };
+                let Ok(line) = self.lines.recv() else {
+                    return Ok(None);
+                };
                 let tick = parse_turn(&line).ok_or(TurnError::BadTurn(line))?;
                 self.taking = Some(tick.index);
                 Ok(Some(tick))
@@ -150,7 +164,10 @@ mod tests {
 
     #[test]
     fn a_turn_is_read_as_it_was_said() {
-        let tick = Tick { index: 7, time: Time::from_seconds(12.25) };
+        let tick = Tick {
+            index: 7,
+            time: Time::from_seconds(12.25),
+        };
         assert_eq!(parse_turn(turn_line(tick).trim_end()), Some(tick));
         for bad in ["turn", "turn 1", "turn 1 x", "turn 1 2 3", "end"] {
             assert_eq!(parse_turn(bad), None, "{bad}");

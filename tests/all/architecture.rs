@@ -84,7 +84,7 @@ fn only_the_shells_touch_clock_disk_environment_and_threads() {
         CLOCKS
             .iter()
             .chain(&OUTSIDE)
-            .any(|touch| tree::names(program, touch))
+            .any(|touch| tree::names(&program, touch))
     };
     let found: Vec<&SourceFile> = sources
         .iter()
@@ -113,10 +113,10 @@ fn only_shm_of_dsr_is_unsafe_or_names_iceoryx2() {
 /// Paths of the files that the compiler is given: libraries, binaries, tests, examples.
 fn crate_roots() -> BTreeSet<String> {
     let is_root = |path: &str| {
-        ["src/lib.rs", "src/main.rs", "build.rs"]
-            .iter()
-            .any(|end| path.ends_with(end))
-            || path.contains("examples/") && !path.contains("/src/")
+        let in_src = path.contains("src/");
+        path.ends_with("src/lib.rs")
+            || path.ends_with("src/main.rs")
+            || !in_src && (path.ends_with("build.rs") || path.contains("examples/"))
     };
     let paths = tree::sources().into_iter().map(|file| file.path);
     let mut roots: BTreeSet<String> = paths.filter(|path| is_root(path)).collect();

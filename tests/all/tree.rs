@@ -166,9 +166,13 @@ pub(crate) fn assert_none(what: &str, found: impl IntoIterator<Item = String>) {
 }
 
 /// Rust code without its unit tests, for what holds of the program only.
-pub(crate) fn program(code: &str) -> &str {
-    code.find("#[cfg(test)]\nmod tests {")
-        .map_or(code, |tests| &code[..tests])
+pub(crate) fn program(code: &str) -> String {
+    let Some((before, tests)) = code.split_once("#[cfg(test)]\nmod tests {") else {
+        return code.to_owned();
+    };
+    // As formatted, the first brace at the beginning of a line ends the module.
+    let after = tests.split_once("\n}\n").map_or("", |(_, after)| after);
+    format!("{before}{after}")
 }
 
 /// Whether `word` stands in the text as a word of its own.
@@ -179,24 +183,26 @@ pub(crate) fn names(text: &str, word: &str) -> bool {
     })
 }
 
-/// The rows of the markdown table below a heading, each cell trimmed.
+/// The rows of the markdown table below a heading, each cell trimmed; no rows where the section
+/// says `None.` instead.
 pub(crate) fn table(markdown: &str, heading: &str) -> Vec<Vec<String>> {
-    let mut lines = markdown
-        .lines()
-        .skip_while(|line| line.trim_start_matches('#').trim() != heading);
+    let is_heading = |line: &&str| line.trim_start_matches('#').trim() == heading;
+    let mut lines = markdown.lines().skip_while(|line| !is_heading(line));
     assert!(lines.next().is_some(), "no heading `{heading}`");
-    let rows: Vec<Vec<String>> = lines
-        .take_while(|line| !line.starts_with('#'))
+    let section: Vec<&str> = lines.take_while(|line| !line.starts_with('#')).collect();
+    if section.contains(&"None.") {
+        return Vec::new();
+    }
+    let rows = section
+        .iter()
         .skip_while(|line| !line.starts_with('|'))
-        .take_while(|line| line.starts_with('|'))
-        .map(|line| {
-            line.trim_matches('|')
-                .split('|')
-                .map(|cell| cell.trim().to_owned())
-                .collect()
-        })
-        .collect();
-    assert!(rows.len() >= 2, "no table below `{heading}`");
+        .take_while(|line| line.starts_with('|'));
+    let cells = |line: &&str| -> Vec<String> {
+        let cells = line.trim_matches('|').split('|');
+        cells.map(|cell| cell.trim().to_owned()).collect()
+    };
+    let rows: Vec<Vec<String>> = rows.map(cells).collect();
+    assert!(rows.len() > 2, "no table below `{heading}`");
     rows[2..].to_vec()
 }
 
@@ -220,8 +226,8 @@ fn comments_and_strings_are_not_code() {
 
 #[test]
 fn a_table_is_read_cell_by_cell() {
-    let markdown =
-        "# A\n| a |\n|---|\n| 1 |\n## B\nText.\n\n| a | b |\n|---|---|\n| `1` | 2, 3 |\n\n| no |";
+    let markdown = "# A\n| a |\n|---|\n| 1 |\n## B\nText.\n\n| a | b |\n|---|---|\n| `1` | 2, 3 |\n\n| no |\n# C\nNone.";
     assert_eq!(table(markdown, "B"), [["`1`", "2, 3"]]);
+    assert!(table(markdown, "C").is_empty());
     assert_eq!(spans("a `b` c `d`.").collect::<Vec<_>>(), ["b", "d"]);
 }

@@ -6,12 +6,14 @@
 //! the user who started it can enter, and its shared memory carries a prefix of its own.
 
 mod arena;
+mod changes;
 mod channel;
 mod session;
 mod store;
 
+pub use changes::{Changes, Update};
 pub use channel::{Publisher, Subscriber};
-pub use session::{AttachError, Changes, ClockError, CommitError, Session, Tick, Update};
+pub use session::{AttachError, ClockError, CommitError, Session, Tick};
 pub use store::{Store, StoreError};
 
 use iceoryx2::config::Config;

@@ -4,14 +4,13 @@
 //! found again without the caller's doing.
 
 use super::arena::ArenaSubscriber;
+use super::changes::Changes;
 use super::{
     Instance, InstanceError, Ipc, IpcNode, MAX_PROCESSES, Publisher, Subscriber, ipc, service_name,
 };
 use crate::arena::Arena;
 use crate::arena::record;
-use crate::{
-    Change, Commit, Epoch, Filter, ReadError, Refusal, Schema, Snapshot, Time, Transaction, Version,
-};
+use crate::{Commit, Epoch, Filter, ReadError, Refusal, Schema, Snapshot, Time, Transaction};
 use iceoryx2::port::client::Client;
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
@@ -462,59 +461,6 @@ impl Session {
             .timed_wait(|_| (), patience)
             .map_err(|e| ipc("waiting for a tick", e))?;
         Ok(ticks.newest()?)
-    }
-}
-
-/// What a subscription gives.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Update {
-    /// A commit that passes the filter.
-    Change(Change),
-    /// Commits were missed, the last of them of this version: read the snapshot.
-    Gap(Version),
-}
-
-/// A subscription to commits.
-#[derive(Debug)]
-pub struct Changes {
-    subscriber: Subscriber<Change>,
-    listener: Listener<Ipc>,
-    filter: Filter,
-    seen: Version,
-}
-
-impl Changes {
-    /// Waits up to `patience` for a commit by anybody.
-    ///
-    /// # Errors
-    /// [`InstanceError`].
-    pub fn wait(&self, patience: Duration) -> Result<(), InstanceError> {
-        let waited = self.listener.timed_wait(|_| (), patience);
-        waited
-            .map(|_| ())
-            .map_err(|e| ipc("waiting for a commit", e))
-    }
-
-    /// The next commit that passes the filter, or the news that some were missed.
-    ///
-    /// # Errors
-    /// [`InstanceError`].
-    pub fn next(&mut self, schema: &Schema) -> Result<Option<Update>, InstanceError> {
-        while let Some(change) = self.subscriber.receive()? {
-            // What the subscription started from is known already.
-            if change.version <= self.seen {
-                continue;
-            }
-            let expected = Version(self.seen.0 + 1);
-            self.seen = change.version;
-            if change.version != expected {
-                return Ok(Some(Update::Gap(change.version)));
-            }
-            if self.filter.passes(&change, schema) {
-                return Ok(Some(Update::Change(change)));
-            }
-        }
-        Ok(None)
     }
 }
 

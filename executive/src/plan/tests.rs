@@ -1,3 +1,5 @@
+//! Planning on graphs: which plan is found, and why there is none.
+
 use super::*;
 use crate::testing::{CARE, add, centre, connect, goal, read, ring};
 use dsr::{Graph, Schema, Time, Transaction};

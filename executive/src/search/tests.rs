@@ -1,3 +1,5 @@
+//! Search on ground tasks: every method agrees with trying everything.
+
 use super::*;
 use crate::task::{Action, Effect, Fact, Formula, State, micro};
 use proptest::prelude::*;

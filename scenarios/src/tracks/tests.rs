@@ -1,3 +1,5 @@
+//! Recorded pedestrians: formats, rates, and the curves between observations.
+
 use super::*;
 
 /// Somebody who walks 1.2 m/s along +y at 15 frames a second, observed every 6th frame.

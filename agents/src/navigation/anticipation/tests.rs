@@ -1,3 +1,5 @@
+//! Anticipation: whom the robot waits for and whom it goes round.
+
 use super::*;
 use nalgebra::Isometry2;
 

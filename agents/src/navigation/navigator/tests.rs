@@ -1,3 +1,5 @@
+//! The navigator as a whole: tasks from start to end among walls and people.
+
 use super::*;
 use crate::grid::BLOCKED;
 use crate::navigation::people::{INTIMATE, PERSONAL};

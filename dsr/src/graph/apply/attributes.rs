@@ -1,0 +1,92 @@
+//! What a commit under way does to attributes. It guarantees that each written one passes the schema and
+//! remembers version, time and writer.
+
+use super::{Work, touch};
+use crate::arena::Address;
+use crate::arena::record::{AttributeRecord, row, split_row};
+use crate::{AttributeId, NodeId, Owner, Refusal, Touch, TypeId, Value};
+
+impl Work<'_> {
+    pub(super) fn retire_attribute(&mut self, address: Address) {
+        let words = AttributeRecord::len(&self.graph.writer.arena, address);
+        self.graph.writer.retire(address, words);
+    }
+
+    /// Writes an attribute and enters it into a record's table.
+    pub(super) fn set_row(
+        &mut self,
+        rows: &mut Vec<u64>,
+        name: &str,
+        value: &Value,
+    ) -> Result<AttributeId, Refusal> {
+        let attribute = self.attribute_id(name)?;
+        self.schema().check_value(attribute, value)?;
+        let record = AttributeRecord {
+            value: value.clone(),
+            version: self.stamp.version,
+            time: self.stamp.time,
+            writer: self.stamp.writer,
+        };
+        let address = self.graph.writer.write(&record.words());
+        let address = self.room(address)?;
+        let at = rows.partition_point(|&r| split_row(r).0 < attribute.0);
+        match rows.get(at).map(|&r| split_row(r)) {
+            Some((found, old)) if found == attribute.0 => {
+                self.retire_attribute(old);
+                rows[at] = row(attribute.0, address);
+            }
+            _ => rows.insert(at, row(attribute.0, address)),
+        }
+        Ok(attribute)
+    }
+
+    pub(super) fn change_attribute(
+        &mut self,
+        owner: &Owner,
+        name: &str,
+        value: Option<&Value>,
+    ) -> Result<(), Refusal> {
+        match owner {
+            Owner::Node(node) => {
+                let (address, mut record) = self.node(node)?;
+                let len = record.words().len();
+                let name = self.change_row(&mut record.rows, name, value)?;
+                record.version = self.stamp.version;
+                self.put_node(Some((address, len)), &record)?;
+                let type_id = TypeId(record.type_id);
+                touch(
+                    &mut self.nodes,
+                    NodeId(record.id),
+                    type_id,
+                    Touch::Updated,
+                    Some(name),
+                );
+            }
+            Owner::Edge(edge) => {
+                let (key, address, mut record) = self.edge(edge)?;
+                let len = record.words().len();
+                let name = self.change_row(&mut record.rows, name, value)?;
+                record.version = self.stamp.version;
+                self.put_edge(key, Some((address, len)), &record)?;
+                touch(&mut self.edges, key, (), Touch::Updated, Some(name));
+            }
+        }
+        Ok(())
+    }
+
+    fn change_row(
+        &mut self,
+        rows: &mut Vec<u64>,
+        name: &str,
+        value: Option<&Value>,
+    ) -> Result<AttributeId, Refusal> {
+        let Some(value) = value else {
+            let attribute = self.attribute_id(name)?;
+            if let Some(at) = rows.iter().position(|&r| split_row(r).0 == attribute.0) {
+                self.retire_attribute(split_row(rows.remove(at)).1);
+            }
+            return Ok(attribute);
+        };
+        self.set_row(rows, name, value)
+    }
+}

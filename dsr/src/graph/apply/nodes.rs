@@ -1,0 +1,183 @@
+//! What a commit under way does to nodes. It guarantees that a node, its name, the members of its type
+//! and the edges that touch it never disagree.
+
+use super::{Work, damaged, read, touch};
+use crate::arena::record::{self, NodeRecord, split_row};
+use crate::arena::{Address, tree, trie};
+use crate::snapshot::name_hash;
+use crate::{NodeId, NodeRef, Refusal, SchemaError, Touch, TypeId, Value};
+
+impl Work<'_> {
+    pub(super) fn find(&self, node: &NodeRef) -> Result<Option<NodeId>, Refusal> {
+        let snapshot = self.snapshot();
+        let found = match node {
+            NodeRef::Id(id) => snapshot.find_node(*id),
+            NodeRef::Name(name) => snapshot.find_node_by_name(name),
+        };
+        Ok(found.map_err(damaged)?.map(|node| node.id()))
+    }
+
+    pub(super) fn node(&self, node: &NodeRef) -> Result<(Address, NodeRecord), Refusal> {
+        let id = match node {
+            NodeRef::Id(id) => *id,
+            NodeRef::Name(_) => self
+                .find(node)?
+                .ok_or_else(|| Refusal::NotFound(node.to_string()))?,
+        };
+        let arena = &self.graph.writer.arena;
+        let address = read(trie::find(arena, self.root.nodes, id.0))?
+            .ok_or_else(|| Refusal::NotFound(node.to_string()))?;
+        Ok((address, read(NodeRecord::read(arena, address))?))
+    }
+
+    pub(super) fn put_node(
+        &mut self,
+        old: Option<(Address, usize)>,
+        node: &NodeRecord,
+    ) -> Result<(), Refusal> {
+        let words = node.words();
+        let writer = &mut self.graph.writer;
+        let put = match old {
+            Some((address, len)) => writer.replace(address, len, &words),
+            None => writer.write(&words),
+        };
+        let put = put.and_then(|at| trie::insert(writer, self.root.nodes, node.id, at));
+        self.root.nodes = self.room(put)?;
+        Ok(())
+    }
+
+    pub(super) fn create_node(
+        &mut self,
+        id: Option<NodeId>,
+        type_name: &str,
+        name: &str,
+        attributes: &[(String, Value)],
+    ) -> Result<(), Refusal> {
+        if name.is_empty() || name.len() > 255 {
+            return Err(SchemaError::BadName(name.to_owned()).into());
+        }
+        let type_id = self.type_id(type_name)?;
+        let id = id.unwrap_or(NodeId(self.root.next_id));
+        for taken in [NodeRef::Id(id), name.into()] {
+            if self.find(&taken)?.is_some() {
+                return Err(Refusal::AlreadyExists(taken.to_string()));
+            }
+        }
+        if id.0 == u64::MAX {
+            return Err(Refusal::SchemaViolation(format!(
+                "{id} cannot be a node's id"
+            )));
+        }
+        self.root.next_id = self.root.next_id.max(id.0 + 1);
+        let mut node = NodeRecord {
+            id: id.0,
+            type_id: type_id.0,
+            name: 0,
+            version: self.stamp.version,
+            out: 0,
+            into: 0,
+            rows: Vec::new(),
+        };
+        touch(&mut self.nodes, id, type_id, Touch::Created, None);
+        for (name, value) in attributes {
+            let name = self.set_row(&mut node.rows, name, value)?;
+            touch(&mut self.nodes, id, type_id, Touch::Updated, Some(name));
+        }
+        let blob = record::write_blob(&mut self.graph.writer, name.as_bytes());
+        node.name = self.room(blob)?;
+        self.put_node(None, &node)?;
+        let names = tree::insert(
+            &mut self.graph.writer,
+            self.root.names,
+            [name_hash(name), id.0],
+            0,
+        );
+        self.root.names = self.room(names)?;
+        self.index_type(type_id, id, true)?;
+        self.root.node_count += 1;
+        self.created.push(id);
+        Ok(())
+    }
+
+    /// Adds the node to, or takes it from, the members of its type.
+    fn index_type(&mut self, type_id: TypeId, id: NodeId, member: bool) -> Result<(), Refusal> {
+        let directory = self.root.types;
+        self.root.types = self.index(directory, type_id.0, [id.0, 0], member)?;
+        Ok(())
+    }
+
+    pub(super) fn index(
+        &mut self,
+        directory: Address,
+        id: u16,
+        key: tree::Key,
+        member: bool,
+    ) -> Result<Address, Refusal> {
+        let entry = record::directory_entry(&self.graph.writer.arena, directory, id);
+        let (members, count) = read(entry)?;
+        let writer = &mut self.graph.writer;
+        let entry = if member {
+            tree::insert(writer, members, key, 0).map(|root| (root, count + 1))
+        } else {
+            tree::remove(writer, members, key).map(|root| (root, count.saturating_sub(1)))
+        };
+        let directory =
+            entry.and_then(|entry| record::set_directory_entry(writer, directory, id, entry));
+        self.room(directory)
+    }
+
+    pub(super) fn delete_node(&mut self, node: &NodeRef) -> Result<(), Refusal> {
+        let (_, found) = self.node(node)?;
+        let id = NodeId(found.id);
+        let edges = {
+            let snapshot = self.snapshot();
+            let handle = snapshot.find_node(id).map_err(damaged)?;
+            let handle = handle.ok_or_else(|| Refusal::NotFound(node.to_string()))?;
+            let edges = handle.out_edges().chain(handle.in_edges());
+            edges
+                .collect::<Result<std::collections::BTreeSet<_>, _>>()
+                .map_err(damaged)?
+        };
+        for edge in edges {
+            self.delete_edge(edge)?;
+        }
+        let (address, node) = self.node(&id.into())?;
+        for &row in &node.rows {
+            self.retire_attribute(split_row(row).1);
+        }
+        let name = read(record::read_blob(&self.graph.writer.arena, node.name))?;
+        let hash = name_hash(&String::from_utf8_lossy(&name));
+        let writer = &mut self.graph.writer;
+        let words = record::blob_len(writer.arena(), node.name);
+        writer.retire(node.name, words);
+        writer.retire(address, node.words().len());
+        let nodes = trie::remove(writer, self.root.nodes, id.0);
+        let names = tree::remove(writer, self.root.names, [hash, id.0]);
+        self.root.nodes = self.room(nodes)?;
+        self.root.names = self.room(names)?;
+        self.index_type(TypeId(node.type_id), id, false)?;
+        self.root.node_count -= 1;
+        touch(
+            &mut self.nodes,
+            id,
+            TypeId(node.type_id),
+            Touch::Deleted,
+            None,
+        );
+        Ok(())
+    }
+
+    pub(super) fn retype_node(&mut self, node: &NodeRef, type_name: &str) -> Result<(), Refusal> {
+        let type_id = self.type_id(type_name)?;
+        let (address, mut node) = self.node(node)?;
+        let id = NodeId(node.id);
+        self.index_type(TypeId(node.type_id), id, false)?;
+        self.index_type(type_id, id, true)?;
+        let len = node.words().len();
+        node.type_id = type_id.0;
+        node.version = self.stamp.version;
+        self.put_node(Some((address, len)), &node)?;
+        touch(&mut self.nodes, id, type_id, Touch::Updated, None);
+        Ok(())
+    }
+}

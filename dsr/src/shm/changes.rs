@@ -1,0 +1,60 @@
+//! Following the commits of an instance. This file guarantees that a subscriber which missed some is
+//! told so.
+
+use super::{InstanceError, Ipc, Subscriber, ipc};
+use crate::{Change, Filter, Schema, Version};
+use iceoryx2::port::listener::Listener;
+use std::time::Duration;
+
+/// What a subscription gives.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Update {
+    /// A commit that passes the filter.
+    Change(Change),
+    /// Commits were missed, the last of them of this version: read the snapshot.
+    Gap(Version),
+}
+
+/// A subscription to commits.
+#[derive(Debug)]
+pub struct Changes {
+    pub(super) subscriber: Subscriber<Change>,
+    pub(super) listener: Listener<Ipc>,
+    pub(super) filter: Filter,
+    pub(super) seen: Version,
+}
+
+impl Changes {
+    /// Waits up to `patience` for a commit by anybody.
+    ///
+    /// # Errors
+    /// [`InstanceError`].
+    pub fn wait(&self, patience: Duration) -> Result<(), InstanceError> {
+        let waited = self.listener.timed_wait(|_| (), patience);
+        waited
+            .map(|_| ())
+            .map_err(|e| ipc("waiting for a commit", e))
+    }
+
+    /// The next commit that passes the filter, or the news that some were missed.
+    ///
+    /// # Errors
+    /// [`InstanceError`].
+    pub fn next(&mut self, schema: &Schema) -> Result<Option<Update>, InstanceError> {
+        while let Some(change) = self.subscriber.receive()? {
+            // What the subscription started from is known already.
+            if change.version <= self.seen {
+                continue;
+            }
+            let expected = Version(self.seen.0 + 1);
+            self.seen = change.version;
+            if change.version != expected {
+                return Ok(Some(Update::Gap(change.version)));
+            }
+            if self.filter.passes(&change, schema) {
+                return Ok(Some(Update::Change(change)));
+            }
+        }
+        Ok(None)
+    }
+}
