@@ -30,6 +30,8 @@ struct Search {
     fruitless: Option<Time>,
     /// What made a new plan necessary.
     why: String,
+    /// Whether the mission's reason tells of what is in the way ahead.
+    warned: bool,
 }
 
 /// The executive agent without its process.

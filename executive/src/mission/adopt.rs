@@ -150,6 +150,7 @@ impl<P: Planner> Executive<P> {
             !goes
         });
         self.search.fruitless = None;
+        self.search.warned = false;
     }
 }
 

@@ -86,10 +86,10 @@ impl<P: Planner> Executive<P> {
                 Ok(())
             }
             Finding::Sound { dispatch, ahead } => {
-                if let Some(why) = ahead
-                    && self.replace(turn, mission, &why)?
-                {
-                    return Ok(());
+                match ahead {
+                    Some(why) if self.replace(turn, mission, &why)? => return Ok(()),
+                    None if std::mem::take(&mut self.search.warned) => mission.reason.clear(),
+                    _ => {}
                 }
                 if let Some(binding) = dispatch {
                     self.dispatch(now, mission, binding);
@@ -135,6 +135,7 @@ impl<P: Planner> Executive<P> {
             }
             Sought::Nothing(reason) => {
                 let reason = format!("{why}; {reason}");
+                self.search.warned = true;
                 if mission.reason != reason {
                     mission.reason.clone_from(&reason);
                     self.log(turn.now, "the step in hand goes on".to_owned(), reason);
