@@ -1,4 +1,6 @@
 //! The `cortex` program: see `cortex --help`.
+#![forbid(unsafe_code)]
+
 fn main() -> std::process::ExitCode {
     cortex::main()
 }

@@ -248,19 +248,30 @@ impl Observer {
         free.retain(|_| taken.next() == Some(false));
     }
 
-    /// Holds it against those the camera had to see and did not.
+    /// Holds it against those the camera had to see and did not. Hidden behind a body is not had to:
+    /// one that this frame shows, or one that it missed as well.
     fn count_misses(&mut self, frame: &CameraFrame, sightings: &[Sighting], plan: &FloorPlan) {
         let camera = Point2::from(frame.world_from_camera.translation.vector);
         let config = &self.config;
+        let bodies: Vec<Point2<f64>> = sightings
+            .iter()
+            .map(|sighting| sighting.position)
+            .chain(
+                self.tracks
+                    .iter()
+                    .filter(|t| t.is_followed(config))
+                    .map(Track::position),
+            )
+            .collect();
         for track in &mut self.tracks {
             if track.last_frame == self.frame {
                 continue;
             }
             let place = track.position();
             let visible = sees(frame, plan, place, config.view_margin)
-                && !sightings
+                && !bodies
                     .iter()
-                    .any(|s| hides(camera, s.position, place, config.body_radius));
+                    .any(|&body| hides(camera, body, place, config.body_radius));
             if visible {
                 track.missed(frame.time, config);
             }

@@ -2,7 +2,9 @@
 //! owns what the outcome says; it guarantees that each step of a plan is applicable after those
 //! before it, and that the goal holds at the end.
 
-use crate::ground::{Environment, Ground, Instance, Problem, ProblemError, Reached, build};
+use crate::ground::{
+    Environment, Ground, Instance, Operator, Problem, ProblemError, Reached, build,
+};
 use crate::search::{Answer, Effort, Limits, Reachability, search};
 use crate::task::{Literal, Micro, from_micro};
 use dsr::{ReadError, Snapshot};
@@ -266,7 +268,7 @@ fn why_unsolvable(
     if options.raised.iter().any(|raised| raised.by.is_infinite()) {
         reasons.push("steps that failed lately were left out".to_owned());
     }
-    if problem.program.operators.iter().any(|o| o.creates()) {
+    if problem.program.operators.iter().any(Operator::creates) {
         reasons.push(format!(
             "each rule was given {} new nodes at most",
             options.spares

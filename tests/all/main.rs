@@ -1,5 +1,15 @@
 //! Multi-process and end-to-end tests of Cortex, in one binary.
 #![forbid(unsafe_code)]
+#![allow(
+    clippy::unwrap_used,
+    reason = "what the tests share ends the test where it cannot go on"
+)]
 
+mod architecture;
+mod dependencies;
+mod documentation;
+mod examples;
 mod graph;
+mod run;
 mod support;
+mod tree;

@@ -45,8 +45,12 @@ pub struct Tracking {
     pub confirmation_looks: u32,
     /// A track not yet confirmed dies when unseen for so long, s.
     pub tentative_time: f64,
-    /// A person dies when cameras looked at the place and saw nobody for so long, s.
+    /// A person is gone when cameras looked at the place and saw nobody for so long, s: seven frames
+    /// in a row at 10 frames a second, which 10 % of misses bring about once in ten million.
     pub lost_in_view: f64,
+    /// Somebody gone is remembered for so long since last seen, s, and found again under the same
+    /// number.
+    pub remembered: f64,
     /// One look that sees nobody stands for at most so much of that time, s: what lies further back
     /// was not looked at.
     pub look_time: f64,
@@ -93,7 +97,8 @@ impl Default for Tracking {
             confirmation_hits: 4,
             confirmation_looks: 6,
             tentative_time: 1.0,
-            lost_in_view: 1.5,
+            lost_in_view: 0.7,
+            remembered: 3.0,
             look_time: 0.25,
             lost_out_of_view: 10.0,
             coast_time: 1.0,

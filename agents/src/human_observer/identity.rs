@@ -48,11 +48,14 @@ impl Observer {
         let candidates = self.tracks.iter().enumerate().filter_map(|(index, track)| {
             let lost = track.id.is_some() && track.last_seen < new.born;
             let gap = new.born.since(track.last_seen);
-            let reach =
-                (config.handover_distance + config.handover_speed * gap).min(config.handover_limit);
+            let reach = config.handover_distance + config.handover_speed * gap;
             let distance = track.distance_to(new.position());
-            let reachable =
-                lost && distance <= reach && !plan.wall_between(track.position(), new.position());
+            // Where one leaves and another comes by the same door, they face opposite ways.
+            let turned = gap < config.remembered && track.faces_away_from(new);
+            let reachable = lost
+                && distance <= reach.min(config.handover_limit)
+                && !turned
+                && !plan.wall_between(track.position(), new.position());
             reachable.then_some((distance, track.id, index))
         });
         let nearest = candidates.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -91,6 +94,7 @@ impl Observer {
         let mut people: Vec<(u64, &Track)> = self
             .tracks
             .iter()
+            .filter(|t| t.is_present(&self.config))
             .filter_map(|t| Some((t.id?, t)))
             .collect();
         people.sort_by(|a, b| {

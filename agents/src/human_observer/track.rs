@@ -119,9 +119,9 @@ impl Track {
         track
     }
 
-    /// The person at `now`, once confirmed.
+    /// The person at `now`, once confirmed and until gone.
     pub(super) fn person(&self, now: Time, config: &Tracking) -> Option<TrackedPerson> {
-        let id = self.id?;
+        let id = self.id.filter(|_| self.is_present(config))?;
         let mut track = self.clone();
         track.predict(now, config);
         Some(TrackedPerson {
@@ -308,11 +308,32 @@ impl Track {
         self.evidence(config).0 >= config.confirmation_hits
     }
 
+    /// Whether the evidence speaks for the person being there, and not only for having been.
+    pub(super) fn is_present(&self, config: &Tracking) -> bool {
+        self.watched <= config.lost_in_view
+    }
+
+    /// Whether the two headings differ by more than a right angle.
+    pub(super) fn faces_away_from(&self, other: &Self) -> bool {
+        match (self.heading, other.heading) {
+            (Some(own), Some(other)) => {
+                difference(own.angle(), other.angle()).abs() > std::f64::consts::FRAC_PI_2
+            }
+            _ => false,
+        }
+    }
+
+    /// Whether it is a person seen a moment ago, so that the position can be relied on.
+    pub(super) fn is_followed(&self, config: &Tracking) -> bool {
+        self.id.is_some() && self.time.since(self.last_seen) <= config.look_time
+    }
+
     /// Whether the evidence has run out at `now`.
     pub(super) fn is_dead(&self, now: Time, config: &Tracking) -> bool {
         let unseen = now.since(self.last_seen);
         if self.id.is_some() {
-            self.watched > config.lost_in_view || unseen > config.lost_out_of_view
+            unseen > config.lost_out_of_view
+                || !self.is_present(config) && unseen > config.remembered
         } else {
             let misses = self.evidence(config).1;
             misses

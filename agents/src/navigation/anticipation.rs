@@ -11,8 +11,8 @@ use nalgebra::{Point2, Rotation2, Vector2, distance, distance_squared};
 use std::f64::consts::TAU;
 
 /// How far ahead the manoeuvres are rolled, seconds, and in how many steps.
-const HORIZON: f64 = 5.0;
-const STEPS: usize = 25;
+const HORIZON: f64 = 6.0;
+const STEPS: usize = 30;
 const STEP: f64 = HORIZON / STEPS as f64;
 /// People farther away than this do not count, metres: within the horizon a walker and the robot
 /// close about as much.
@@ -28,10 +28,16 @@ const BORDER_RATE: f64 = 3.0;
 const CONTACT_RATE: f64 = 40.0;
 /// Up to this squared deviation a place counts as near the border of the personal space.
 const BORDER: f64 = 2.4;
+/// The same around those who stand.
+const STANDING_BORDER: f64 = 1.7;
 /// What a second at the inner edge of social space costs.
 const SOCIAL_RATE: f64 = 0.2;
 /// How fast a prediction loses weight, seconds.
-const TRUST: f64 = 5.0;
+const TRUST: f64 = 10.0;
+/// After so long without headway time weighs double, seconds.
+const PATIENCE: f64 = 10.0;
+/// What a way through an obstacle costs, seconds: there will be one around it.
+const HIDDEN: f64 = 4.0;
 /// A new manoeuvre must be better than the last by so much, so that the robot does not dither.
 const LOYALTY: f64 = 0.4;
 
@@ -115,7 +121,9 @@ impl Anticipation {
         let trivial = self.walkers + self.standing.len() == 0;
         if !trivial {
             for manoeuvre in candidates(robot, scene.line, self.last) {
-                let bonus = if self.last == Some(manoeuvre) {
+                // Who goes on waiting would begin to wait anew each time.
+                let lasting = matches!(manoeuvre, Manoeuvre::Along(_) | Manoeuvre::Aside { .. });
+                let bonus = if lasting && self.last == Some(manoeuvre) {
                     LOYALTY
                 } else {
                     0.0
@@ -144,11 +152,7 @@ impl Anticipation {
         let near = |person: &&Person| distance(&person.position(), &robot.position) < SIGHT;
         let seen = |person: &Person, time: f64| Seen {
             presence: person.predicted(time),
-            border: if scene.addressee == Some(&person.name) {
-                PERSONAL
-            } else {
-                BORDER
-            },
+            border: border(person, scene),
         };
         let people = || scene.people.iter().filter(near);
         self.standing.clear();
@@ -163,12 +167,11 @@ impl Anticipation {
         }
         self.to_end.clear();
         self.to_end.resize(scene.line.len(), (0.0, 0.0));
-        let pace = scene.limits.max_speed.max(0.05);
         for k in (1..scene.line.len()).rev() {
             let (length, cost) = self.to_end[k];
             let step = distance(&scene.line[k - 1], &scene.line[k]);
             let rate = intrusion(scene.line[k - 1], &self.standing, scene.limits.radius);
-            self.to_end[k - 1] = (length + step, cost + rate * step / pace);
+            self.to_end[k - 1] = (length + step, cost + rate * step / pace(scene));
         }
     }
 
@@ -211,33 +214,56 @@ impl Anticipation {
                 return cost;
             }
         }
-        let (rest, spaces) = self.remaining(robot.position, rollout.next, scene);
-        let pressing = 1.0 + scene.waited / 6.0;
-        cost + spaces + pressing * rest / scene.limits.max_speed.max(0.05)
+        cost + self.remaining(robot.position, rollout.next, scene)
     }
 
-    /// How far it still is from `place` to the goal, metres, and what the spaces on the way cost:
-    /// straight to the farthest point of the line that nothing hides, looking a few metres on from
-    /// point `next`, and then along the line.
-    fn remaining(&self, place: Point2<f64>, next: usize, scene: &Scene) -> (f64, f64) {
-        let line = scene.line;
-        let last = (next + 16).min(line.len().saturating_sub(1));
-        let open = |k: &usize| {
-            let way = line[*k] - place;
-            let pieces = (way.norm() / 0.2).ceil().max(1.0) as usize;
-            (1..pieces).all(|j| {
-                !scene
-                    .ground
-                    .is_blocked(place + way * (j as f64 / pieces as f64))
-            })
+    /// What it costs to get from `place` to the goal: straight to a point of the line within a few
+    /// metres on from point `next`, and then along the line; the least over those points.
+    fn remaining(&self, place: Point2<f64>, next: usize, scene: &Scene) -> f64 {
+        let second = (1.0 + scene.waited / PATIENCE) / scene.limits.max_speed.max(0.05);
+        let radius = scene.limits.radius;
+        let through = |join: usize| {
+            let way = scene.line[join] - place;
+            let length = way.norm();
+            let pieces = (length / 0.25).ceil().max(1.0) as usize;
+            let (mut hidden, mut spaces) = (0.0, 0.0);
+            for j in 1..pieces {
+                let at = place + way * (j as f64 / pieces as f64);
+                hidden = if scene.ground.is_blocked(at) {
+                    HIDDEN
+                } else {
+                    hidden
+                };
+                spaces += intrusion(at, &self.standing, radius);
+            }
+            let (rest, cost) = self.to_end[join];
+            let spaces = cost + spaces * length / pieces as f64 / pace(scene);
+            hidden + spaces + (length + rest) * second
         };
-        let seen = (0..=last).rev().step_by(2).find(open);
-        let hidden = if seen.is_some() { 0.0 } else { 2.0 };
-        let join = seen.unwrap_or(next.min(last));
-        line.get(join).map_or((0.0, 0.0), |point| {
-            let (length, cost) = self.to_end[join];
-            (hidden + distance(point, &place) + length, cost)
-        })
+        let last = (next + 16).min(scene.line.len().saturating_sub(1));
+        let joins = (next.min(last)..=last).step_by(4);
+        joins
+            .filter(|&join| join < scene.line.len())
+            .map(through)
+            .fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// The pace at which standing people's spaces are passed, m/s: less than the top speed, as turns
+/// and starts take time; were it more, putting the passage off would look like a gain.
+fn pace(scene: &Scene) -> f64 {
+    0.7 * scene.limits.max_speed.max(0.05)
+}
+
+/// Up to which squared deviation a place counts as near the border of the person's space: less
+/// far out where the border is not a prediction, and not at all for whom the robot comes to see.
+fn border(person: &Person, scene: &Scene) -> f64 {
+    if scene.addressee == Some(&person.name) {
+        PERSONAL
+    } else if person.is_walking() {
+        BORDER
+    } else {
+        STANDING_BORDER
     }
 }
 
@@ -255,9 +281,9 @@ fn intrusion(place: Point2<f64>, seen: &[Seen], radius: f64) -> f64 {
         } else if q < PERSONAL {
             PERSONAL_RATE * (1.5 - 0.5 * q / PERSONAL)
         } else if q < *border {
-            SOCIAL_RATE + (BORDER_RATE - SOCIAL_RATE) * (BORDER - q) / (BORDER - PERSONAL)
+            SOCIAL_RATE + (BORDER_RATE - SOCIAL_RATE) * (border - q) / (border - PERSONAL)
         } else if q < SOCIAL {
-            SOCIAL_RATE * (SOCIAL - q) / (SOCIAL - BORDER)
+            SOCIAL_RATE * (SOCIAL - q) / (SOCIAL - PERSONAL)
         } else {
             0.0
         };

@@ -304,14 +304,14 @@ impl Navigation {
         let robot = &world.robot;
         if let Some(odometry) = messages.odometry {
             let pose = odometry.world_from_robot;
-            let told = read::edge_pose(snapshot, world.world, robot.id)?;
+            let told = read::edge_pose(snapshot, world.id, robot.id)?;
             let differs = told.is_none_or(|told| {
                 (told.translation.vector - pose.translation.vector).norm() > MOVED
                     || wrapped(told.rotation.angle() - pose.rotation.angle()).abs() > TURNED
             });
             if differs {
                 transaction.push(Operation::CreateEdge {
-                    edge: EdgeRef::new(world.world, "pose", robot.id),
+                    edge: EdgeRef::new(world.id, "pose", robot.id),
                     attributes: vec![("transform".to_owned(), Value::Pose(planar_pose(&pose)))],
                 });
             }

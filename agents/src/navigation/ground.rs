@@ -46,19 +46,14 @@ impl Ground {
                 self.occupy(from + (to - from) * (k as f64 / pieces as f64));
             }
         }
-        let reach = (radius / CELL).round() as isize;
-        let within = |&(x, y): &(isize, isize)| x * x + y * y <= reach * reach;
-        let disc: Vec<_> = (-reach..=reach)
-            .flat_map(|x| (-reach..=reach).map(move |y| (x, y)))
-            .filter(within)
-            .collect();
+        let reach = (radius / CELL).round() as usize;
         for cell in (0..self.occupied.len()).filter(|&cell| self.occupied[cell]) {
-            let (column, row) = ((cell % SIDE) as isize, (cell / SIDE) as isize);
-            for (x, y) in &disc {
-                let (x, y) = (column + x, row + y);
-                if (0..SIDE as isize).contains(&x) && (0..SIDE as isize).contains(&y) {
-                    self.blocked[y as usize * SIDE + x as usize] = true;
-                }
+            let (column, row) = (cell % SIDE, cell / SIDE);
+            for y in row.saturating_sub(reach)..(row + reach + 1).min(SIDE) {
+                let rise = y.abs_diff(row);
+                let half = (reach * reach - rise * rise).isqrt();
+                let columns = column.saturating_sub(half)..(column + half + 1).min(SIDE);
+                self.blocked[y * SIDE..][columns].fill(true);
             }
         }
     }

@@ -273,7 +273,7 @@ impl Search {
         self.reached_by.clear();
         self.reached_by.resize(size, u8::MAX);
         self.open.clear();
-        let stride = self.stride as isize;
+        let stride = self.stride.cast_signed();
         let steps = STEPS.map(|(column, row)| row * stride + column);
         let waiting = |node: usize, cost: f64| {
             let estimate = estimate(node);

@@ -248,7 +248,7 @@ fn compile_rule(scope: &mut Scope<'_>, rule: &Rule) -> Result<Operator, Reason> 
     operator.dormant = rule.dormant;
     operator.strict = rule.strict;
     let on_left = |node: &PatternNode| bound.iter().find(|b| b.variable == node.variable);
-    for node in rule.right.nodes.iter() {
+    for node in &rule.right.nodes {
         match on_left(node) {
             None => create(scope, &mut operator, &node.variable, &node.type_name),
             Some(left) if left.type_name != node.type_name => {

@@ -144,7 +144,7 @@ impl Problem {
                 let needed = words.link(link, operator, &lack.environment);
                 let needed = format!("rule `{rule}` needs {needed}");
                 let [from, to] = [link.from, link.to].map(|s| lack.environment[s as usize]);
-                if !self.program.made[usize::from(link.label)] {
+                if !self.is_makeable(operator, link) {
                     return format!("{needed}, which no rule brings about");
                 }
                 if asked.len() >= DEPTH || asked.contains(&(link.label, from, to)) {
@@ -161,6 +161,26 @@ impl Problem {
         }
     }
 
+    /// Whether some rule makes links of that label between such types.
+    fn is_makeable(&self, asking: &Operator, link: Link) -> bool {
+        let fits = |operator: &Operator, slot: u32, asked: u32| {
+            let wanted = &asking.variables[asked as usize].types;
+            let made = operator.variables.get(slot as usize);
+            made.is_none_or(|made| !made.types.is_disjoint(wanted))
+        };
+        let mut makeable = false;
+        for operator in &self.program.operators {
+            operator.each_change(&mut |change| {
+                if let Change::Link(made) = change {
+                    makeable |= made.label == link.label
+                        && fits(operator, made.from, link.from)
+                        && fits(operator, made.to, link.to);
+                }
+            });
+        }
+        makeable
+    }
+
     /// What an operator lacks at the best binding that extends `start`.
     fn lack(&self, operator: &Operator, start: Environment, reached: &Reached) -> Lack {
         // A link that is not there whatever the others are bound to says most.
@@ -172,9 +192,11 @@ impl Problem {
                 environment: start,
             };
         }
+        let links = operator.links.iter();
         let mut search = LackSearch {
             operator,
             reached,
+            makeable: links.map(|&l| self.is_makeable(operator, l)).collect(),
             tried: 0,
             best: None,
         };
@@ -221,6 +243,8 @@ enum Missing {
 struct LackSearch<'a> {
     operator: &'a Operator,
     reached: &'a Reached,
+    /// Which of the operator's links rules may make.
+    makeable: Vec<bool>,
     tried: usize,
     best: Option<Lack>,
 }
@@ -248,7 +272,9 @@ impl LackSearch<'_> {
             .filter(|&index| !met[index])
             .min_by_key(|&index| {
                 let link = operator.links[index];
-                (open(link.from) + open(link.to), index)
+                // What no rule makes stands fast: it is bound first.
+                let ends = open(link.from) + open(link.to);
+                (self.makeable[index], ends, index)
             });
         let Some(index) = next else {
             let variables = operator.variables[..operator.bound].iter().enumerate();

@@ -59,6 +59,7 @@ impl Facts {
         new
     }
 
+    #[cfg(test)]
     pub(crate) fn remove_link(&mut self, link: Link) {
         if self.links.remove(&link) {
             let Link { label, from, to } = link;
@@ -123,6 +124,7 @@ impl Facts {
     }
 
     /// Makes an object not exist, but leaves its links.
+    #[cfg(test)]
     pub(crate) fn remove_types(&mut self, object: Object) {
         for exact in std::mem::take(&mut self.types[object as usize]) {
             self.of_type[usize::from(exact)].retain(|&other| other != object);

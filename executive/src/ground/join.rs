@@ -25,7 +25,6 @@ enum Step {
 pub(crate) struct Plan {
     by_link: Vec<Vec<Step>>,
     by_variable: Vec<Vec<Step>>,
-    from_nothing: Vec<Step>,
 }
 
 impl Plan {
@@ -40,12 +39,11 @@ impl Plan {
                 .map(|(index, link)| order(&[link.from as usize, link.to as usize], Some(index)))
                 .collect(),
             by_variable: (0..operator.bound).map(|v| order(&[v], None)).collect(),
-            from_nothing: order(&[], None),
         }
     }
 
     /// The bindings that have `new` as the link number `index` of the operator.
-    pub(crate) fn from_link(
+    pub(crate) fn with_link(
         &self,
         operator: &Operator,
         facts: &Facts,
@@ -69,7 +67,7 @@ impl Plan {
     }
 
     /// The bindings that have `object` for the variable.
-    pub(crate) fn from_variable(
+    pub(crate) fn with_variable(
         &self,
         operator: &Operator,
         facts: &Facts,
@@ -81,18 +79,6 @@ impl Plan {
         if bind(operator, facts, &mut environment, variable as u32, object) {
             let steps = &self.by_variable[variable];
             extend(operator, facts, steps, &mut environment, found);
-        }
-    }
-
-    /// All bindings.
-    pub(crate) fn all(&self, operator: &Operator, facts: &Facts, found: &mut Vec<Environment>) {
-        let mut environment = operator.environment();
-        let fixed = operator.fixed.iter();
-        if fixed
-            .clone()
-            .all(|&(slot, object)| facts.is_of(object, &operator.variables[slot].types))
-        {
-            extend(operator, facts, &self.from_nothing, &mut environment, found);
         }
     }
 }

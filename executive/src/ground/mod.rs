@@ -10,6 +10,7 @@ mod facts;
 mod join;
 mod program;
 mod reach;
+#[cfg(test)]
 mod simulate;
 mod truth;
 mod value;
@@ -134,11 +135,6 @@ impl Problem {
     /// The name of an object.
     pub(crate) fn name(&self, object: Object) -> &str {
         &self.names[object as usize]
-    }
-
-    /// Whether an object stands for a node that a rule is yet to create.
-    pub(crate) fn is_spare(&self, object: Object) -> bool {
-        object as usize >= self.world.nodes.len()
     }
 
     pub(crate) fn words(&self) -> Words<'_> {

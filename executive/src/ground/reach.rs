@@ -5,7 +5,7 @@
 use super::effects::{Guard, Primitive, each_primitive};
 use super::facts::Facts;
 use super::join::Plan;
-use super::program::{Environment, Link, Object, Operator, Place, Program, Term};
+use super::program::{Change, Environment, Link, Object, Operator, Place, Program, Term};
 use super::truth::always;
 use super::value::evaluate;
 use super::world::World;
@@ -59,6 +59,8 @@ struct Reaching<'a> {
     seen: FxHashSet<(usize, Environment)>,
     /// Bindings of operators that still sleep.
     sleeping: Vec<Vec<Environment>>,
+    /// Operators of which later facts may change what they bring about.
+    open_ended: Vec<bool>,
     arrivals: VecDeque<Arrival>,
     reached: Reached,
 }
@@ -98,6 +100,7 @@ pub(crate) fn reach(
         plans: operators().map(|o| Plan::new(o, &world.facts)).collect(),
         sleeping: vec![Vec::new(); program.operators.len()],
         seen: FxHashSet::default(),
+        open_ended: program.operators.iter().map(open_ended).collect(),
         arrivals: VecDeque::new(),
         initial: &world.facts,
         program,
@@ -129,6 +132,14 @@ pub(crate) fn reach(
     Ok(reaching.reached)
 }
 
+fn open_ended(operator: &Operator) -> bool {
+    let mut found = false;
+    operator.each_change(&mut |change| {
+        found |= matches!(change, Change::Forall(_) | Change::Assign(..));
+    });
+    found
+}
+
 impl<'a> Reaching<'a> {
     fn operator(&self, number: usize) -> &'a Operator {
         self.program.operators.get(number).unwrap_or(self.goal)
@@ -154,8 +165,10 @@ impl<'a> Reaching<'a> {
             // after their rule was.
             let mut grew = false;
             for index in 0..self.reached.instances.len() {
-                let instance = self.reached.instances[index].clone();
-                grew |= self.effects(&instance);
+                if self.open_ended[self.reached.instances[index].operator] {
+                    let instance = self.reached.instances[index].clone();
+                    grew |= self.effects(&instance);
+                }
             }
             if !grew && self.arrivals.is_empty() {
                 return Ok(());
@@ -174,7 +187,7 @@ impl<'a> Reaching<'a> {
                     let (number, variable) = self.by_type[usize::from(exact)][at];
                     let operator = self.operator(number);
                     let (plan, facts) = (&self.plans[number], &self.reached.facts);
-                    plan.from_variable(operator, facts, variable, object, &mut found);
+                    plan.with_variable(operator, facts, variable, object, &mut found);
                     self.bound(number, std::mem::take(&mut found));
                 }
             }
@@ -186,7 +199,7 @@ impl<'a> Reaching<'a> {
                     let (number, index) = self.by_label[usize::from(link.label)][at];
                     let operator = self.operator(number);
                     let (plan, facts) = (&self.plans[number], &self.reached.facts);
-                    plan.from_link(operator, facts, index, link, &mut found);
+                    plan.with_link(operator, facts, index, link, &mut found);
                     self.bound(number, std::mem::take(&mut found));
                 }
             }

@@ -1,10 +1,8 @@
-//! Rules carried out on facts, one after another: what the monitor foresees the rest of a plan by,
-//! and an independent judge of the planner. This file guarantees the outcome that the grammar's own
-//! application has.
+//! Rules carried out on facts: the tests hold the compiled rules against the store by it. This file
+//! guarantees the outcome that the grammar's own application has.
 
 use super::effects::{Guard, Primitive, each_primitive};
 use super::facts::Facts;
-use super::join::Plan;
 use super::program::{Environment, Object, Operator, Program};
 use super::truth::holds;
 use super::value::evaluate;
@@ -52,9 +50,9 @@ pub(crate) fn apply(
     environment: &mut Environment,
     facts: &mut Facts,
 ) {
-    for slot in operator.bound..operator.variables.len() {
-        if environment[slot] == super::program::UNBOUND {
-            environment[slot] = facts.add_object();
+    for created in &mut environment[operator.bound..operator.variables.len()] {
+        if *created == super::program::UNBOUND {
+            *created = facts.add_object();
         }
     }
     let before = facts.clone();
@@ -108,15 +106,4 @@ pub(crate) fn apply(
             _ => {}
         }
     }
-}
-
-/// Whether a goal holds somewhere.
-pub(crate) fn goal_holds(goal: &Operator, facts: &Facts) -> bool {
-    let mut found = Vec::new();
-    Plan::new(goal, facts).all(goal, facts, &mut found);
-    found.into_iter().any(|mut environment| {
-        let absent = goal.absent.iter();
-        absent.clone().all(|l| !facts.has_link(l.at(&environment)))
-            && goal.tests.iter().all(|t| holds(t, facts, &mut environment))
-    })
 }

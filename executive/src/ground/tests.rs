@@ -11,6 +11,7 @@ use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
+use std::fmt::Write;
 use std::sync::Arc;
 
 /// Nodes by name with type and level, and links.
@@ -120,7 +121,8 @@ fn links(variables: usize, least: usize, most: usize) -> impl Strategy<Value = S
         for ((from, to, label), star) in links {
             let star = if star == 0 { "*" } else { "" };
             let (from, to) = (VARIABLES[from], VARIABLES[to]);
-            text += &format!("{from}->{to}({}){star} ", ["p", "q"][label]);
+            let label = ["p", "q"][label];
+            write!(text, "{from}->{to}({label}){star} ").unwrap();
         }
         text
     })

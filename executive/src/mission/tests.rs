@@ -259,13 +259,13 @@ fn a_mission_without_a_plan_fails_with_the_reason() {
     house.close("kitchen", "ward");
     house.close("garden", "ward");
     house.run(40);
-    expect!["failed, 0: no plan: ana -front-> shelly cannot be reached: rule `takeTheAttention` needs shelly -is_near-> ana; rule `approach` needs ana -in-> hall; no rule makes a link `in` there"]
+    expect!["failed, 0: no plan: ana -front-> shelly cannot be reached: rule `takeTheAttention` needs shelly -is_near-> ana; rule `approach` needs shelly -in-> ward; rule `changeRoom` needs some room -connected-> ward, which no rule brings about"]
         .assert_eq(&house.mission("greet"));
     expect![[r"
         mission `greet` is queued
         mission `greet` begins
-        mission `greet` waits (no plan: ana -front-> shelly cannot be reached: rule `takeTheAttention` needs shelly -is_near-> ana; rule `approach` needs ana -in-> hall; no rule makes a link `in` there)
-        mission `greet` failed (no plan: ana -front-> shelly cannot be reached: rule `takeTheAttention` needs shelly -is_near-> ana; rule `approach` needs ana -in-> hall; no rule makes a link `in` there)"]]
+        mission `greet` waits (no plan: ana -front-> shelly cannot be reached: rule `takeTheAttention` needs shelly -is_near-> ana; rule `approach` needs shelly -in-> ward; rule `changeRoom` needs some room -connected-> ward, which no rule brings about)
+        mission `greet` failed (no plan: ana -front-> shelly cannot be reached: rule `takeTheAttention` needs shelly -is_near-> ana; rule `approach` needs shelly -in-> ward; rule `changeRoom` needs some room -connected-> ward, which no rule brings about)"]]
     .assert_eq(&house.journal.join("\n"));
     assert_eq!(house.turn(), 0);
 }

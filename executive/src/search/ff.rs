@@ -1,5 +1,5 @@
 //! The FF heuristic: the cost of a plan that ignores deletes, found along the cheapest supporters
-//! by h_add (Hoffmann and Nebel 2001, Keyder and Geffner 2008), and the actions of it that can be
+//! by `h_add` (Hoffmann and Nebel 2001, Keyder and Geffner 2008), and the actions of it that can be
 //! applied at once. This file guarantees that a state it calls a dead end is one.
 
 use super::relaxed::{NO_ACTION, Proposition, Relaxed};

@@ -92,7 +92,7 @@ impl<'a> LandmarkCut<'a> {
         }
     }
 
-    /// h_max from scratch.
+    /// `h_max` from scratch.
     fn explore(&mut self, state: &[u64]) {
         let relaxed = self.relaxed;
         self.distance.fill(UNREACHED);
@@ -119,7 +119,7 @@ impl<'a> LandmarkCut<'a> {
         }
     }
 
-    /// h_max after the actions of a cut have become cheaper.
+    /// `h_max` after the actions of a cut have become cheaper.
     fn lower(&mut self, cheaper: &[u32]) {
         let relaxed = self.relaxed;
         self.open.clear();

@@ -117,7 +117,9 @@ impl Formula {
         match self {
             Self::Literal(literal) => visit(*literal),
             Self::And(parts) | Self::Or(parts) => {
-                parts.iter().for_each(|part| part.each_literal(visit));
+                for part in parts {
+                    part.each_literal(visit);
+                }
             }
         }
     }

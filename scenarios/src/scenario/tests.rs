@@ -1,3 +1,5 @@
+//! Scenario files: what a good one says, and where each mistake is underlined.
+
 #![allow(clippy::float_cmp, reason = "what a file says is read to the bit")]
 #![allow(clippy::too_many_lines, reason = "a report is read in one piece")]
 
@@ -357,6 +359,9 @@ fn each_kind_of_mistake_is_told_apart() {
         }),
         ("[7.0, 1.0, 0.5]", "[7.0, 1.0]", |p| {
             matches!(p, P::WrongType { .. })
+        }),
+        ("[2.0, 2.0], face", "[0.1, 2.0], face", |p| {
+            matches!(p, P::NoSpace { .. })
         }),
         ("go = \"desk\"", "go = \"dusk\"", |p| {
             matches!(p, P::UnknownName { .. })

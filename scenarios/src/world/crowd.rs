@@ -74,7 +74,7 @@ impl Crowd {
         let start = scenario.start;
         let source = if let Some(tracks) = tracks {
             Source::Recorded {
-                tracks: tracks.placed(&scenario.tracks),
+                tracks: tracks.placed(&scenario.tracks, scenario.bounds),
                 start,
             }
         } else {
@@ -103,10 +103,11 @@ impl Crowd {
             source,
             bodies: Vec::new(),
         };
+        crowd.gather(start);
         if let Source::Simulated { flows, .. } = &mut crowd.source {
             let robot = scenario.robot.pose.translation.vector.into();
             for flow in flows {
-                flow.fill(robot, plan);
+                flow.fill(robot, plan, &mut crowd.bodies);
             }
         }
         crowd.gather(start);
@@ -137,27 +138,29 @@ impl Crowd {
             for words in speech {
                 address(words, now, robot, scheduled, flows);
             }
-            let before = std::mem::take(&mut self.bodies);
+            // Each sees those before them where they have got to, so no two take the same spot.
+            let mut bodies = std::mem::take(&mut self.bodies);
             let walking = Walking {
                 now,
                 dt,
                 robot,
                 people,
-                others: &before,
                 obstacles,
                 plan,
             };
             for (one, person) in scheduled.iter_mut().zip(people.iter()) {
                 if one.walker.present {
                     one.follow_schedule(person, now, plan);
-                    one.walker.step(&walking);
+                    one.walker.step(&walking, &bodies);
+                    one.walker.show(&mut bodies);
                 }
             }
             for flow in flows {
-                flow.under_way
-                    .iter_mut()
-                    .for_each(|walker| walker.step(&walking));
-                flow.renew(&walking);
+                for walker in &mut flow.under_way {
+                    walker.step(&walking, &bodies);
+                    walker.show(&mut bodies);
+                }
+                flow.renew(&walking, &mut bodies);
             }
         }
         self.gather(now);
@@ -244,13 +247,25 @@ impl Scheduled {
 
 impl Flow {
     /// Spreads the stream's people over its way, none beside the robot.
-    fn fill(&mut self, robot: Point2<f64>, plan: &FloorPlan) {
+    fn fill(&mut self, robot: Point2<f64>, plan: &FloorPlan, bodies: &mut Vec<Body>) {
         for _ in 0..self.stream.people {
             let progress = self.random.random_range(0.0..0.95);
             let walker = self.enter(progress, plan);
-            if (walker.body.position - robot).norm() > 2.0 * ENTRY_GAP {
-                self.under_way.push(walker);
-            }
+            self.admit(walker, robot, bodies);
+        }
+    }
+
+    /// Lets somebody in where there is room.
+    fn admit(&mut self, walker: Walker, robot: Point2<f64>, bodies: &mut Vec<Body>) {
+        let at = walker.body.position;
+        let mut others = bodies.iter();
+        if others.all(|other| (other.position - at).norm() > ENTRY_GAP)
+            && (robot - at).norm() > 2.0 * ENTRY_GAP
+        {
+            bodies.push(walker.body.clone());
+            self.under_way.push(walker);
+        } else {
+            self.entered -= 1;
         }
     }
 
@@ -279,25 +294,14 @@ impl Flow {
     }
 
     /// Lets those who arrived leave, and others enter where there is room.
-    fn renew(&mut self, walking: &Walking<'_>) {
+    fn renew(&mut self, walking: &Walking<'_>, bodies: &mut Vec<Body>) {
         let way = (self.stream.to - self.stream.from).normalize();
         let to = self.stream.to;
         self.under_way
             .retain(|walker| (to - walker.body.position).dot(&way) > 0.3 && !walker.has_arrived());
         for _ in self.under_way.len()..self.stream.people {
             let walker = self.enter(0.0, walking.plan);
-            let at = walker.body.position;
-            let mut others = walking
-                .others
-                .iter()
-                .chain(self.under_way.iter().map(|w| &w.body));
-            let free = others.all(|other| (other.position - at).norm() > ENTRY_GAP)
-                && (walking.robot.position - at).norm() > 2.0 * ENTRY_GAP;
-            if free {
-                self.under_way.push(walker);
-            } else {
-                self.entered -= 1;
-            }
+            self.admit(walker, walking.robot.position, bodies);
         }
     }
 }

@@ -1,3 +1,5 @@
+//! The simulated world: the same to the bit, and true to its scenario.
+
 use super::*;
 use crate::scenario::{Entry, Face, Stream};
 

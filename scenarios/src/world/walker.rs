@@ -27,8 +27,6 @@ pub(super) struct Walking<'a> {
     pub(super) robot: Disc,
     /// The scenario's people, which [`Face::Person`] counts through.
     pub(super) people: &'a [Person],
-    /// Everybody as they were before the step.
-    pub(super) others: &'a [Body],
     pub(super) obstacles: &'a Obstacles,
     pub(super) plan: &'a FloorPlan,
 }
@@ -82,8 +80,15 @@ impl Walker {
         self.way.is_empty()
     }
 
-    /// Moves on by one step.
-    pub(super) fn step(&mut self, world: &Walking<'_>) {
+    /// Takes its place among all bodies.
+    pub(super) fn show(&self, bodies: &mut [Body]) {
+        if let Some(body) = bodies.iter_mut().find(|body| body.name == self.body.name) {
+            body.clone_from(&self.body);
+        }
+    }
+
+    /// Moves on by one step among all `bodies`.
+    pub(super) fn step(&mut self, world: &Walking<'_>, bodies: &[Body]) {
         if self.attention_until.is_some_and(|until| world.now < until) {
             self.body.velocity = Vector2::zeros();
             self.turn_to(world.robot.position, world.dt);
@@ -93,7 +98,7 @@ impl Walker {
         self.pass_corners();
         let Some(corner) = self.way.last().copied() else {
             self.body.velocity = Vector2::zeros();
-            self.look(world);
+            self.look(world, bodies);
             return;
         };
         let to_go = corner - self.body.position;
@@ -105,8 +110,7 @@ impl Walker {
             self.speed
         };
         let wanted = to_go.normalize() * speed;
-        let others: Vec<Disc> = world
-            .others
+        let others: Vec<Disc> = bodies
             .iter()
             .filter(|other| other.name != self.body.name)
             .map(Body::disc)
@@ -182,7 +186,7 @@ impl Walker {
         }
     }
 
-    fn look(&mut self, world: &Walking<'_>) {
+    fn look(&mut self, world: &Walking<'_>, bodies: &[Body]) {
         let target = match self.face {
             None => return,
             Some(Face::Heading(heading)) => {
@@ -191,7 +195,7 @@ impl Walker {
             Some(Face::Point(point)) => point,
             Some(Face::Person(person)) => {
                 let name = &world.people[person].name;
-                let Some(other) = world.others.iter().find(|other| other.name == *name) else {
+                let Some(other) = bodies.iter().find(|other| other.name == *name) else {
                     return;
                 };
                 other.position

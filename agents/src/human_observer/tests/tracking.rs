@@ -83,9 +83,12 @@ fn somebody_who_vanishes_in_view_is_dropped_soon_and_out_of_view_later() {
     let mut run = Run::new(corners(10.0), 3);
     run.errors.clutter = 0.0;
     let truth = |t: f64| vec![(t < 3.0).then(|| pose(1.0, 1.0, 0.0))];
-    run.go(0.0, 0.0, 4.0, &truth);
-    assert_eq!(run.go(4.0, 4.0, 4.2, &truth).scene.people.len(), 1);
-    assert_eq!(run.go(4.3, 4.3, 4.8, &truth).scene.people.len(), 0);
+    let mut people_at = |start, end| run.go(start, end, end, &truth).scene.people.len();
+    assert_eq!(
+        (people_at(0.0, 3.5), people_at(3.6, 3.9)),
+        (1, 0),
+        "within 0.9 s"
+    );
 
     let mut run = Run::new(corners(10.0), 3);
     run.go(0.0, 0.0, 3.0, &|_| vec![Some(pose(1.0, 1.0, 0.0))]);
@@ -99,6 +102,26 @@ fn somebody_who_vanishes_in_view_is_dropped_soon_and_out_of_view_later() {
         (at(6.0), at(12.9), at(13.1)),
         (1, 1, 0),
         "no camera, no evidence against"
+    );
+}
+
+#[test]
+fn somebody_overlooked_for_two_seconds_is_found_again_and_not_taken_for_a_newcomer() {
+    let run = |back: Isometry2<f64>| {
+        let mut run = Run::new(corners(10.0), 3);
+        run.go(0.0, 1.0, 3.0, &|_| vec![Some(pose(1.0, 1.0, 0.0))]);
+        assert_eq!(run.go(3.1, 4.0, 5.0, &|_| Vec::new()).scene.people, []);
+        run.go(5.0, 5.5, 6.0, &|_| vec![Some(back)]).ids
+    };
+    assert_eq!(
+        run(pose(1.5, 1.2, 0.4)),
+        [[1]],
+        "came out from behind a pillar"
+    );
+    assert_eq!(
+        run(pose(1.5, 1.2, PI)),
+        [[2]],
+        "came in by the door the other left by"
     );
 }
 

@@ -1,3 +1,5 @@
+//! The elastic band: what it gains, what it never gives up.
+
 use super::*;
 use nalgebra::Isometry2;
 use proptest::prelude::*;
@@ -132,7 +134,9 @@ proptest! {
         people in proptest::collection::vec((0.0..6.0, -2.0..2.0, -1.0..1.0, -1.0..1.0), 0..4),
     ) {
         let mut obstacles = Obstacles::new();
-        points.iter().for_each(|&(x, y)| obstacles.push_point(Point2::new(x, y)));
+        for &(x, y) in &points {
+            obstacles.push_point(Point2::new(x, y));
+        }
         let people: Vec<_> =
             people.iter().map(|&(x, y, vx, vy)| person(x, y, (vx, vy))).collect();
         let gains = Gains::default();

@@ -1,3 +1,5 @@
+//! Speed control: lines are followed within the limits, and nothing too close is driven at.
+
 use super::*;
 use dsr::Time;
 use proptest::prelude::*;

@@ -23,7 +23,7 @@ const WALKS_ON: f64 = 1.0;
 /// The graph as the navigation sees it.
 #[derive(Debug, Clone)]
 pub(super) struct World {
-    pub(super) world: NodeId,
+    pub(super) id: NodeId,
     pub(super) robot: Robot,
     pub(super) social: bool,
     pub(super) walls: Vec<Wall>,
@@ -169,7 +169,7 @@ pub(super) fn world(snapshot: &Snapshot, now: Time) -> Result<Option<World>, Rea
         });
     }
     Ok(Some(World {
-        world: world.id(),
+        id: world.id(),
         robot: self::robot(snapshot, &robot)?,
         social: world
             .value("social")?

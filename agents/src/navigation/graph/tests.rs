@@ -1,3 +1,5 @@
+//! Navigation on the graph: steps are carried out, resumed and reported.
+
 use super::*;
 use crate::grid::{BLOCKED, CostGrid};
 use crate::navigation::control::{Motion, Unicycle};
@@ -145,7 +147,9 @@ impl Home {
             .collect();
         let mut grid = CostGrid::covering([0.0, 0.0, 10.0, 4.0], 0.1);
         let mut obstacles = crate::navigation::obstacles::Obstacles::new();
-        walls.iter().for_each(|&wall| obstacles.push_wall(wall));
+        for &wall in &walls {
+            obstacles.push_wall(wall);
+        }
         for k in 0..grid.costs.len() {
             if obstacles.clearance(grid.centre((k % grid.width, k / grid.width))) < 0.25 {
                 grid.costs[k] = BLOCKED;

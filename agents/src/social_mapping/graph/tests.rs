@@ -1,3 +1,5 @@
+//! Social mapping on the graph: what is read, and what is written when.
+
 use super::*;
 use crate::grid::{BLOCKED, FREE};
 use crate::social_mapping::zones::Zone;

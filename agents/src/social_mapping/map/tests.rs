@@ -1,3 +1,5 @@
+//! The social grid: what each place costs, with and without social behaviour.
+
 use super::*;
 use crate::grid::{BLOCKED, FREE};
 use crate::social_mapping::object_space::{Outline, UsageCurve};
