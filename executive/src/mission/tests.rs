@@ -107,7 +107,7 @@ fn without_another_plan_the_step_in_hand_goes_on() {
             .steps()
             .contains("greet/1/0 changeRoom(shelly, hall, kitchen) running")
     );
-    expect!["running, 0: `approach` will not be possible: p (ana) has no link `in` to room (ward); no plan: ana -front-> shelly cannot be reached: rule `takeTheAttention` needs shelly -is_near-> ana; rule `approach` needs ana -in-> some room; no rule makes a link `in` there"].assert_eq(&house.mission("greet"));
+    expect!["running, 0: `approach` will not be possible: p (ana) has no link `in` to room (ward); no plan: ana -front-> shelly cannot be reached: rule `takeTheAttention` needs shelly -is_near-> ana; rule `approach` needs ana -in-> some room, which no rule brings about"].assert_eq(&house.mission("greet"));
     house.change(|transaction| transaction.create_edge("ana", "in", "ward"));
     house.run(1);
     expect!["running, 0: "].assert_eq(&house.mission("greet"));
