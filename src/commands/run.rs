@@ -140,10 +140,12 @@ impl Plan<'_> {
         let social = !self.arguments.no_social;
         let baseline = baseline.map(|(other, metrics)| Run {
             social: false,
+            success: other.succeeded(),
             samples: &other.truths,
             metrics,
         });
-        let run = Run { social, samples: &recording.truths, metrics };
+        let success = recording.succeeded();
+        let run = Run { social, success, samples: &recording.truths, metrics };
         let seed = self.arguments.seed;
         Picture { scenario: self.scenario, spaces, seed, run, baseline, at: None }.svg()
     }
