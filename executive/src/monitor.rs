@@ -199,7 +199,7 @@ fn ahead(
     later: &[Step],
     goal: &Goal,
 ) -> Result<Option<String>, ReadError> {
-    let mut touched = Touched::default();
+    let mut touched = Touched::new(&grammar.types, snapshot.schema());
     touched.add(hand.rule, &hand.binding);
     for step in later {
         let Some(ground) = ground(grammar, snapshot, step)? else {
@@ -303,3 +303,6 @@ fn observable(rule: &Rule) -> Option<Rule> {
             .all(|edge| seen.left.edges.contains(edge));
     (!same_nodes || !same_edges).then_some(seen)
 }
+
+#[cfg(test)]
+mod tests;

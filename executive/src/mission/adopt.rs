@@ -126,7 +126,11 @@ impl<P: Planner> Executive<P> {
                 planned.remove(0);
                 index += 1;
             }
-            None => planned[0].status = StepStatus::Dispatched,
+            None => {
+                planned[0].status = StepStatus::Dispatched;
+                let what = format!("{} is dispatched to {}", planned[0], planned[0].agent);
+                self.log(now, what, "");
+            }
         }
         for mut step in planned {
             step.name = format!("{}/{attempt}/{index}", mission.name);
@@ -146,6 +150,7 @@ impl<P: Planner> Executive<P> {
             !goes
         });
         self.search.fruitless = None;
+        self.search.warned = false;
     }
 }
 

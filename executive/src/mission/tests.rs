@@ -20,6 +20,7 @@ fn a_plan_is_carried_out_to_the_end() {
         mission `greet` is queued
         mission `greet` begins
         mission `greet` has plan 1: changeRoom(robot=shelly, room1=hall, room2=kitchen), changeRoom(robot=shelly, room1=kitchen, room2=ward), approach(p=ana, robot=shelly, room=ward), takeTheAttention(p=ana, robot=shelly)
+        changeRoom(robot=shelly, room1=hall, room2=kitchen) is dispatched to navigation
         changeRoom(robot=shelly, room1=kitchen, room2=ward) is dispatched to navigation
         approach(p=ana, robot=shelly, room=ward) is dispatched to navigation
         takeTheAttention(p=ana, robot=shelly) is dispatched to navigation
@@ -92,6 +93,54 @@ fn a_surprise_that_leaves_the_first_step_as_it_is_does_not_interrupt_it() {
     house.agent = Agent::Works;
     house.run(8);
     expect!["succeeded, 1: the goal holds"].assert_eq(&house.mission("greet"));
+}
+
+#[test]
+fn without_another_plan_the_step_in_hand_goes_on() {
+    let mut house = House::new(&[("greet", GREET_ANA, 0)]);
+    house.agent = Agent::Hangs;
+    house.run(3);
+    house.change(|transaction| transaction.delete_edge("ana", "in", "ward"));
+    house.run(2);
+    assert!(
+        house
+            .steps()
+            .contains("greet/1/0 changeRoom(shelly, hall, kitchen) running")
+    );
+    expect!["running, 0: `approach` will not be possible: p (ana) has no link `in` to room (ward); no plan: ana -front-> shelly cannot be reached: rule `takeTheAttention` needs shelly -is_near-> ana; rule `approach` needs ana -in-> some room, which no rule brings about"].assert_eq(&house.mission("greet"));
+    house.change(|transaction| transaction.create_edge("ana", "in", "ward"));
+    house.run(1);
+    expect!["running, 0: "].assert_eq(&house.mission("greet"));
+    house.agent = Agent::Works;
+    house.run(12);
+    expect!["succeeded, 0: the goal holds"].assert_eq(&house.mission("greet"));
+}
+
+#[test]
+fn whom_the_plan_aims_at_is_watched_though_the_goal_names_nobody() {
+    let goal = r#"{ p:person "shelly":robot p->"shelly"(front) }
+        precondition { (= p.status "awake") }"#;
+    let mut house = House::new(&[("greet", goal, 0)]);
+    house.change(|transaction| {
+        transaction.create_node("person", "bob", vec![("status".to_owned(), "awake".into())]);
+        transaction.create_edge("bob", "in", "ward");
+        transaction.set("ana", "status", "awake");
+    });
+    house.agent = Agent::Hangs;
+    house.run(3);
+    assert!(
+        house
+            .steps()
+            .contains("takeTheAttention(ana, shelly) pending")
+    );
+    house.change(|transaction| transaction.set("ana", "status", "asleep"));
+    house.run(1);
+    assert!(
+        house
+            .steps()
+            .contains("takeTheAttention(bob, shelly) pending")
+    );
+    expect![[r#"running, 1: the plan will not reach the goal: (= p.status "awake") does not hold: p.status = "asleep""#]].assert_eq(&house.mission("greet"));
 }
 
 #[test]

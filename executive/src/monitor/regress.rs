@@ -3,27 +3,49 @@
 //! it keeps is necessary for the plan; where it cannot tell whether a step changes something, that
 //! is left out.
 
-use dsr::NodeId;
+use dsr::{NodeId, Schema};
 use grammar::{
-    AttributePath, Binding, Condition, Effect, Expression, Goal, Name, Pattern, PatternNode, Rule,
+    AttributePath, Binding, Constant, Effect, Goal, Name, Pattern, PatternNode, Rule, Types,
 };
 
+mod condition;
+
+/// Stands for every type.
+const ANY: &str = "*";
+
 /// What a number of steps may change between them. `None` stands for any node or label.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Touched {
+#[derive(Debug)]
+pub(super) struct Touched<'a> {
+    types: &'a Types,
+    schema: &'a Schema,
     edges: Vec<(Option<NodeId>, Option<Name>, Option<NodeId>)>,
+    /// Links that come about in any case.
+    made: Vec<(NodeId, Name, NodeId)>,
     attributes: Vec<Name>,
     /// Deleted, or given another type.
     nodes: Vec<Option<NodeId>>,
-    /// Whether nodes come, go or change their type.
-    population: bool,
+    /// Types of which nodes come or go.
+    population: Vec<Name>,
 }
 
 fn meets<T: PartialEq>(one: Option<&T>, other: Option<&T>) -> bool {
     one.is_none() || other.is_none() || one == other
 }
 
-impl Touched {
+impl<'a> Touched<'a> {
+    /// Nothing yet.
+    pub(super) fn new(types: &'a Types, schema: &'a Schema) -> Self {
+        Self {
+            types,
+            schema,
+            edges: Vec::new(),
+            made: Vec::new(),
+            attributes: Vec::new(),
+            nodes: Vec::new(),
+            population: Vec::new(),
+        }
+    }
+
     /// Adds what applying `rule` at `binding` may change.
     pub(super) fn add(&mut self, rule: &Rule, binding: &Binding) {
         let id = |variable: &Name| binding.get(variable);
@@ -36,32 +58,56 @@ impl Touched {
         }
         for edge in &rule.right.edges {
             let known = rule.left.edge(&edge.from, &edge.label, &edge.to);
-            if known.is_none_or(|known| known.negated != edge.negated) {
-                self.edges
-                    .push((id(&edge.from), Some(edge.label.clone()), id(&edge.to)));
+            if known.is_some_and(|known| known.negated == edge.negated) {
+                continue;
             }
+            let (from, label, to) = (id(&edge.from), edge.label.clone(), id(&edge.to));
+            if let (false, Some(from), Some(to)) = (edge.negated, from, to) {
+                self.made.push((from, label.clone(), to));
+            }
+            self.edges.push((from, Some(label), to));
         }
         for node in &rule.left.nodes {
-            match rule.right.node(&node.variable) {
-                None => self.delete(id(&node.variable)),
-                Some(kept) if kept.type_name != node.type_name => self.retype(id(&node.variable)),
-                Some(_) => {}
-            }
+            let gone = match rule.right.node(&node.variable) {
+                None => true,
+                Some(kept) if kept.type_name == node.type_name => continue,
+                Some(kept) => {
+                    self.population.push(kept.type_name.clone());
+                    false
+                }
+            };
+            self.population.push(node.type_name.clone());
+            self.displace(id(&node.variable), gone);
         }
-        let known = |node: &PatternNode| rule.bound_nodes().any(|n| n.variable == node.variable);
-        self.population |= !rule.right.nodes.iter().all(known);
+        let new = |node: &&PatternNode| !rule.bound_nodes().any(|n| n.variable == node.variable);
+        let new = rule.right.nodes.iter().filter(new);
+        self.population
+            .extend(new.map(|node| node.type_name.clone()));
         self.effects(&rule.effect, binding, &mut Vec::new());
     }
 
-    fn delete(&mut self, node: Option<NodeId>) {
-        self.edges.push((node, None, None));
-        self.edges.push((None, None, node));
-        self.retype(node);
+    /// A node goes, or changes its type.
+    fn displace(&mut self, node: Option<NodeId>, gone: bool) {
+        self.nodes.push(node);
+        if gone {
+            self.edges.push((node, None, None));
+            self.edges.push((None, None, node));
+        }
     }
 
-    fn retype(&mut self, node: Option<NodeId>) {
-        self.nodes.push(node);
-        self.population = true;
+    /// Whether nodes of that type or its kin may come or go.
+    fn populates(&self, type_name: &str) -> bool {
+        let below = |special: &str, general: &str| {
+            let known = self
+                .schema
+                .find_type(special)
+                .zip(self.schema.find_type(general));
+            self.types.is_subtype(special, general)
+                || known.is_some_and(|(special, general)| self.schema.is_subtype(special, general))
+        };
+        self.population.iter().any(|changing| {
+            *changing == ANY || below(changing, type_name) || below(type_name, changing)
+        })
     }
 
     fn effects(&mut self, effects: &[Effect], binding: &Binding, scope: &mut Vec<Name>) {
@@ -84,17 +130,18 @@ impl Touched {
                     | AttributePath::Edge { attribute, .. }) = target;
                     self.attributes.push(attribute.clone());
                 }
-                Effect::Create { variable, .. } => {
+                Effect::Create {
+                    variable,
+                    type_name,
+                } => {
                     scope.push(variable.clone());
-                    self.population = true;
+                    self.population.push(type_name.clone());
                 }
-                Effect::Delete { variable } => {
+                Effect::Delete { variable } | Effect::Retype { variable, .. } => {
+                    let gone = matches!(effect, Effect::Delete { .. });
                     let node = id(variable);
-                    self.delete(node);
-                }
-                Effect::Retype { variable, .. } => {
-                    let node = id(variable);
-                    self.retype(node);
+                    self.population.push(ANY.into());
+                    self.displace(node, gone);
                 }
                 Effect::Forall { variables, body } => {
                     scope.extend(variables.iter().map(|node| node.variable.clone()));
@@ -142,14 +189,47 @@ impl Touched {
         (needed, kept)
     }
 
-    /// The goal with only those parts that hold now if they ever will.
+    /// The nodes that the plan makes the goal hold at: its constants, and each variable for which
+    /// the steps make but one link of the goal's.
+    fn aimed_at(&self, goal: &Goal, constants: &Binding) -> Binding {
+        let mut aim = constants.clone();
+        for edge in goal.pattern.edges.iter().filter(|edge| !edge.negated) {
+            let (from, to) = (aim.get(&edge.from), aim.get(&edge.to));
+            let mut fitting: Vec<(NodeId, NodeId)> = (self.made.iter())
+                .filter(|(_, label, _)| *label == edge.label)
+                .map(|&(from, _, to)| (from, to))
+                .filter(|(made_from, made_to)| {
+                    meets(Some(made_from), from.as_ref()) && meets(Some(made_to), to.as_ref())
+                })
+                .collect();
+            fitting.sort_unstable();
+            fitting.dedup();
+            if let [(from, to)] = fitting[..] {
+                aim.insert(edge.from.clone(), from);
+                aim.insert(edge.to.clone(), to);
+            }
+        }
+        aim
+    }
+
+    /// The goal, at the nodes that the plan makes it hold at, with only those parts that hold now
+    /// if they ever will.
     pub(super) fn needed_for(&self, goal: &Goal, constants: &Binding) -> Goal {
+        let constants = &self.aimed_at(goal, constants);
         let mut needed = goal.clone();
+        for (variable, id) in constants.iter() {
+            let name = variable.to_string();
+            needed.constants.entry(name).or_insert(Constant::Id(id.0));
+        }
         let free: Vec<Name> = (goal.pattern.nodes.iter())
             .map(|node| node.variable.clone())
             .filter(|variable| constants.get(variable).is_none())
             .collect();
-        if self.population && !free.is_empty() {
+        let populated = |variable: &Name| {
+            let node = goal.pattern.node(variable);
+            node.is_some_and(|node| self.populates(&node.type_name))
+        };
+        if free.iter().any(populated) {
             needed.pattern = Pattern::default();
             needed.precondition = None;
             return needed;
@@ -176,96 +256,4 @@ impl Touched {
         needed.precondition = self.conjuncts(goal.precondition.as_ref(), &kept, &free);
         needed
     }
-
-    fn conjuncts(
-        &self,
-        condition: Option<&Condition>,
-        binding: &Binding,
-        free: &[Name],
-    ) -> Option<Condition> {
-        let all = match condition? {
-            Condition::And(all) => all.as_slice(),
-            one => std::slice::from_ref(one),
-        };
-        let settled = |part: &&Condition| !self.unsettles(part, binding, &mut free.to_vec());
-        let kept: Vec<Condition> = all.iter().filter(settled).cloned().collect();
-        (!kept.is_empty()).then_some(Condition::And(kept))
-    }
-
-    /// Whether the steps may change the condition's truth, or it is about nodes not there yet.
-    /// Variables in `scope` may be any node.
-    fn unsettles(&self, condition: &Condition, binding: &Binding, scope: &mut Vec<Name>) -> bool {
-        match condition {
-            Condition::Edge { label, from, to } => {
-                self.unsettles_edge([from, to], label, binding, scope)
-            }
-            Condition::Same(one, other) => [one, other]
-                .into_iter()
-                .any(|variable| end(variable, binding, scope).is_err()),
-            Condition::Compare { left, right, .. } => [left, right]
-                .into_iter()
-                .any(|side| self.unsettles_value(side, binding, scope)),
-            Condition::Not(inner) => self.unsettles(inner, binding, scope),
-            Condition::And(parts) | Condition::Or(parts) => parts
-                .iter()
-                .any(|part| self.unsettles(part, binding, scope)),
-            Condition::Exists { variables, body } | Condition::Forall { variables, body } => {
-                let depth = scope.len();
-                scope.extend(variables.iter().map(|node| node.variable.clone()));
-                let unsettled = self.population || self.unsettles(body, binding, scope);
-                scope.truncate(depth);
-                unsettled
-            }
-            Condition::When {
-                condition,
-                consequence,
-            } => {
-                self.unsettles(condition, binding, scope)
-                    || self.unsettles(consequence, binding, scope)
-            }
-        }
-    }
-
-    fn unsettles_edge(
-        &self,
-        ends: [&Name; 2],
-        label: &Name,
-        binding: &Binding,
-        scope: &[Name],
-    ) -> bool {
-        match ends.map(|variable| end(variable, binding, scope)) {
-            [Ok(from), Ok(to)] => self.edge(from, label, to),
-            _ => true,
-        }
-    }
-
-    fn unsettles_value(&self, value: &Expression, binding: &Binding, scope: &[Name]) -> bool {
-        match value {
-            Expression::Literal(_) => false,
-            Expression::Attribute(AttributePath::Node {
-                variable,
-                attribute,
-            }) => self.attributes.contains(attribute) || end(variable, binding, scope).is_err(),
-            Expression::Attribute(AttributePath::Edge {
-                from,
-                label,
-                to,
-                attribute,
-            }) => {
-                self.attributes.contains(attribute)
-                    || self.unsettles_edge([from, to], label, binding, scope)
-            }
-            Expression::Arithmetic { operands, .. } => operands
-                .iter()
-                .any(|operand| self.unsettles_value(operand, binding, scope)),
-        }
-    }
-}
-
-/// The node that a variable stands for: `Err` if it is not there, `Ok(None)` if it may be any.
-fn end(variable: &Name, binding: &Binding, scope: &[Name]) -> Result<Option<NodeId>, ()> {
-    if scope.contains(variable) {
-        return Ok(None);
-    }
-    binding.get(variable).map(Some).ok_or(())
 }
