@@ -34,7 +34,7 @@ const STANDING_BORDER: f64 = 1.7;
 const SOCIAL_RATE: f64 = 0.2;
 /// How fast a prediction loses weight, seconds.
 const TRUST: f64 = 10.0;
-/// After so long without headway time weighs double, seconds.
+/// After so many lost seconds time weighs double.
 const PATIENCE: f64 = 10.0;
 /// What a way through an obstacle costs, seconds: there will be one around it.
 const HIDDEN: f64 = 4.0;
@@ -72,8 +72,8 @@ pub struct Scene<'a> {
     pub ground: &'a Ground,
     /// What the base can do.
     pub limits: &'a Limits,
-    /// How long the robot has made no headway, seconds.
-    pub waited: f64,
+    /// The time that the robot has lost, seconds.
+    pub lost: f64,
     /// Whom the robot is on its way to talk to: it may come up to the border of their space.
     pub addressee: Option<&'a str>,
 }
@@ -220,7 +220,7 @@ impl Anticipation {
     /// What it costs to get from `place` to the goal: straight to a point of the line within a few
     /// metres on from point `next`, and then along the line; the least over those points.
     fn remaining(&self, place: Point2<f64>, next: usize, scene: &Scene) -> f64 {
-        let second = (1.0 + scene.waited / PATIENCE) / scene.limits.max_speed.max(0.05);
+        let second = (1.0 + scene.lost / PATIENCE) / scene.limits.max_speed.max(0.05);
         let radius = scene.limits.radius;
         let through = |join: usize| {
             let way = scene.line[join] - place;

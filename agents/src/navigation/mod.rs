@@ -9,6 +9,7 @@ pub mod obstacles;
 pub mod path;
 pub mod people;
 mod planner;
+mod settled;
 pub mod target;
 #[cfg(test)]
 mod testing;
