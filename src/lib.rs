@@ -5,6 +5,8 @@
 
 mod cli;
 mod commands;
+mod conduct;
+mod progress;
 mod supervise;
 
 use clap::Parser;

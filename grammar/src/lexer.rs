@@ -80,8 +80,8 @@ pub(crate) fn lex(text: &str, start: usize) -> Lexed {
             Lexeme::Comment(words) => lexed.comments.push((range.start, words.trim().to_owned())),
             Lexeme::Token(kind) => {
                 path_next = kind == TokenKind::Symbol("(") && after_include(text, &lexed.tokens);
-                // An empty path is no token: `include()` is told by the parser.
-                if !range.is_empty() {
+                // A blank path is no token: the parser tells of `include()`.
+                if !text[range.clone()].trim().is_empty() {
                     lexed.tokens.push(Token {
                         kind,
                         range,

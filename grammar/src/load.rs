@@ -231,3 +231,6 @@ impl Reading<'_, '_> {
         });
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -420,3 +420,6 @@ fn reads_as_nodes(first: &str, second: &str) -> bool {
     let boolean = |name: &str| matches!(name, "true" | "false");
     (word(first) || word(second)) && !boolean(first) && !boolean(second)
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,6 +1,10 @@
 //! What the tests of several modules share: the grammar of the scenarios, a small care centre, and
 //! strategies for random grammars and graphs.
 
+pub(crate) mod oracle;
+pub(crate) mod random;
+pub(crate) mod repair;
+
 use crate::{Grammar, parse_grammar};
 use dsr::{Graph, Schema, Time, Transaction, Value};
 use std::sync::Arc;

@@ -7,7 +7,10 @@
 #![forbid(unsafe_code)]
 
 mod initial_graph;
+pub mod metrics;
+pub mod picture;
 pub mod process;
+pub mod report;
 pub mod scenario;
 pub mod tracks;
 pub mod world;

@@ -50,7 +50,10 @@ impl Ports {
 
     /// Moves the world on by a tick and sends what its sensors measure.
     fn step(&mut self, world: &mut World) -> Result<(), InstanceError> {
-        let inputs = Inputs { velocity: self.velocity.newest()?, speech: self.speech.drain()? };
+        let inputs = Inputs {
+            velocity: self.velocity.newest()?,
+            speech: self.speech.drain()?,
+        };
         let outputs = world.step(TICK, &inputs);
         for frame in &outputs.frames {
             self.frames.send(frame)?;
@@ -75,7 +78,10 @@ pub fn tick_time(start: Time, index: u64) -> Time {
 ///
 /// # Errors
 /// [`ProcessError`].
-#[allow(clippy::disallowed_methods, reason = "the world's process is the clock of its instance")]
+#[allow(
+    clippy::disallowed_methods,
+    reason = "the world's process is the clock of its instance"
+)]
 pub fn run(
     mut session: Session,
     mut turns: Turns,
@@ -96,7 +102,10 @@ pub fn run(
     while !turns.ended() {
         ports.step(&mut world)?;
         index += 1;
-        announce(Tick { index, time: world.time() })?;
+        announce(Tick {
+            index,
+            time: world.time(),
+        })?;
         // Where the machine is too slow for the speed, time is lost, not caught up in a rush.
         due = (due + period).max(Instant::now().checked_sub(period).unwrap_or(due));
         std::thread::sleep(due.saturating_duration_since(Instant::now()));

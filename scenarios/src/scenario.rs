@@ -297,22 +297,16 @@ pub struct Mission {
     pub priority: i64,
 }
 
-/// How recorded pedestrians map into the world: `world_from_recording`, and where to begin.
-#[derive(Debug, Clone, PartialEq)]
+/// How recorded pedestrians map into the world, and where to begin.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct TracksFrame {
-    /// Pose of the recording's origin in the world.
-    pub world_from_recording: Isometry2<f64>,
+    /// Where the recording's origin is in the world; where not given, the middle of all that was
+    /// recorded comes to the middle of the bounds.
+    pub translation: Option<Vector2<f64>>,
+    /// Angle of the recording's x axis in the world.
+    pub rotation: f64,
     /// Seconds of the recording that are skipped.
     pub offset: f64,
-}
-
-impl Default for TracksFrame {
-    fn default() -> Self {
-        Self {
-            world_from_recording: Isometry2::identity(),
-            offset: 0.0,
-        }
-    }
 }
 
 impl Default for Robot {

@@ -4,9 +4,12 @@
 //! Between observations people move on a cubic Hermite curve through them, so that position and
 //! velocity are continuous.
 
+#[cfg(test)]
+mod tests;
+
 use crate::scenario::{Invalid, Problem, ProblemKind, TracksFrame};
 use crate::world::{Body, wrap};
-use nalgebra::{Isometry2, Point2, Vector2};
+use nalgebra::{Point2, Rotation2, Vector2};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -134,13 +137,23 @@ impl Tracks {
         })
     }
 
-    /// The same people in a scenario's world.
-    pub(crate) fn placed(mut self, frame: &TracksFrame) -> Self {
-        let Isometry2 { rotation, .. } = frame.world_from_recording;
+    /// The same people in a world with these bounds.
+    pub(crate) fn placed(mut self, frame: &TracksFrame, bounds: [f64; 4]) -> Self {
+        let turn = Rotation2::new(frame.rotation);
+        let mut least = Vector2::repeat(f64::INFINITY);
+        let mut most = Vector2::repeat(f64::NEG_INFINITY);
         for sample in self.people.iter_mut().flat_map(|track| &mut track.samples) {
-            sample.position = frame.world_from_recording * sample.position;
-            sample.velocity = rotation * sample.velocity;
-            sample.heading = wrap(sample.heading + rotation.angle());
+            sample.position = turn * sample.position;
+            sample.velocity = turn * sample.velocity;
+            sample.heading = wrap(sample.heading + frame.rotation);
+            least = least.inf(&sample.position.coords);
+            most = most.sup(&sample.position.coords);
+        }
+        let [left, bottom, right, top] = bounds;
+        let middle = Vector2::new(left + right, bottom + top) / 2.0;
+        let translation = frame.translation.unwrap_or(middle - (least + most) / 2.0);
+        for sample in self.people.iter_mut().flat_map(|track| &mut track.samples) {
+            sample.position += translation;
         }
         self.offset += frame.offset;
         self
@@ -324,113 +337,4 @@ fn samples(stretch: &[Observation], first: f64, rate: f64) -> Vec<Sample> {
         sample.heading = heading;
     }
     samples
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Somebody who walks 1.2 m/s along +y at 15 frames a second, observed every 6th frame.
-    fn walking_obsmat() -> String {
-        let line = |step: i32| {
-            let y = 0.48 * f64::from(step);
-            format!("{}.0e+00 7.0 2.5 0.0 {y} 0.0 0.0 1.2", 1 + 6 * step)
-        };
-        (0..10).map(line).collect::<Vec<_>>().join(
-            "
-",
-        )
-    }
-
-    #[test]
-    fn the_rate_of_an_obsmat_follows_from_its_velocities() {
-        let tracks = Tracks::parse("obsmat.txt", &walking_obsmat()).expect("good lines");
-        assert!((tracks.rate - 15.0).abs() < 1e-12);
-        let person = &tracks.people_at(1.0)[0];
-        assert_eq!(person.name, "person_7");
-        assert!(
-            (person.position - Point2::new(2.5, 1.2)).norm() < 1e-9,
-            "{}",
-            person.position
-        );
-        assert!((person.velocity - Vector2::new(0.0, 1.2)).norm() < 1e-9);
-        assert!((person.heading - std::f64::consts::PI / 2.0).abs() < 1e-9);
-    }
-
-    #[test]
-    fn people_appear_stand_vanish_and_come_back() {
-        let text = "# frame id x y\n0 1 0 0\n10 1 0 0\n20 1 1 0\n\n200 1 5 5\n210 1 5 5\n";
-        let tracks = Tracks::parse("plain.txt", text).expect("good lines");
-        assert_eq!(tracks.len(), 2);
-        let names = |seconds| -> Vec<String> {
-            tracks
-                .people_at(seconds)
-                .into_iter()
-                .map(|person| person.name)
-                .collect()
-        };
-        assert_eq!(names(0.0), ["person_1"]);
-        assert_eq!(names(0.8), ["person_1"]);
-        assert!(names(0.9).is_empty() && names(7.9).is_empty());
-        assert_eq!(names(8.0), ["person_1_2"]);
-        assert!(
-            names(9.0).is_empty(),
-            "the recording is over and the world goes on"
-        );
-        assert!((tracks.duration() - 8.4).abs() < 1e-9);
-    }
-
-    #[test]
-    fn position_and_velocity_are_continuous_and_pass_through_the_observations() {
-        let text = "0 1 0 0\n10 1 1 0\n20 1 1.5 0.7\n30 1 1.5 1.5\n";
-        let tracks = Tracks::parse("plain.txt", text).expect("good lines");
-        let at = |time: f64| tracks.people_at(time).remove(0);
-        assert!((at(0.8).position - Point2::new(1.5, 0.7)).norm() < 1e-9);
-        let mut time = 0.0;
-        while time < 1.19 {
-            let (now, next) = (at(time), at(time + 0.001));
-            let rate = (next.position - now.position) / 0.001;
-            assert!(
-                (rate - now.velocity).norm() < 0.05,
-                "at {time}: {rate} {}",
-                now.velocity
-            );
-            assert!(
-                (next.velocity - now.velocity).norm() < 0.05,
-                "a jump at {time}"
-            );
-            time += 0.001;
-        }
-    }
-
-    #[test]
-    fn a_scenario_turns_moves_and_skips() {
-        let tracks = Tracks::parse("obsmat.txt", &walking_obsmat()).expect("good lines");
-        let pose = Isometry2::new(Vector2::new(10.0, 0.0), std::f64::consts::PI / 2.0);
-        let placed = tracks.placed(&TracksFrame {
-            world_from_recording: pose,
-            offset: 1.0,
-        });
-        let person = &placed.people_at(0.0)[0];
-        assert!(
-            (person.position - Point2::new(8.8, 2.5)).norm() < 1e-9,
-            "{}",
-            person.position
-        );
-        assert!((person.velocity - Vector2::new(-1.2, 0.0)).norm() < 1e-9);
-        assert!((wrap(person.heading - std::f64::consts::PI)).abs() < 1e-9);
-    }
-
-    #[test]
-    fn every_broken_line_is_reported_with_its_number() {
-        let text = "0 1 0 0\n0 2 oops 0\n1 2 3\n2.5 1 0 0\n3 1 nan 0\n";
-        let invalid = Tracks::parse("bad.txt", text).expect_err("four bad lines");
-        let lines: Vec<_> = invalid
-            .problems
-            .iter()
-            .map(|p| (p.line, p.column))
-            .collect();
-        assert_eq!(lines, [(2, 5), (3, 1), (4, 1), (5, 5)]);
-        assert!(Tracks::parse("empty.txt", "# nothing\n").is_err());
-    }
 }

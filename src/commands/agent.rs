@@ -10,22 +10,17 @@ use std::time::Duration;
 /// How long an agent waits for the store when it starts.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// All names that `cortex agent` knows, in the order of their turns.
-pub(crate) const NAMES: [&str; 6] = [
-    "world",
-    "human_observer",
-    "object_recognition",
-    "social_mapping",
-    "navigation",
-    "executive",
-];
+/// The agents, in the order of their turns.
+pub(crate) const AGENTS: [&str; 5] =
+    ["human_observer", "object_recognition", "social_mapping", "navigation", "executive"];
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     let instance = super::instance(&arguments.instance.instance)?;
     let name = arguments.name.as_str();
-    if !NAMES.contains(&name) {
-        let help = dsr::suggest(name, NAMES).map_or_else(
-            || format!("one of {}", NAMES.join(", ")),
+    let known = || AGENTS.into_iter().chain(["world"]);
+    if !known().any(|known| known == name) {
+        let help = dsr::suggest(name, known()).map_or_else(
+            || format!("one of {}", known().collect::<Vec<_>>().join(", ")),
             |known| format!("did you mean `{known}`?"),
         );
         return Err(Failure::input_with_help(format!("there is no agent `{name}`"), help));

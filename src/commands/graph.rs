@@ -1,5 +1,6 @@
 //! `cortex graph`: the shared graph of a running instance, or of a file, for people and scripts.
 
+use super::output::{print, print_json};
 use crate::cli::{Graph as Arguments, GraphAction, GraphSource};
 use crate::{Answer, Failure};
 use dsr::{
@@ -7,7 +8,6 @@ use dsr::{
     Transaction, Update, Value, json,
 };
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::Path;
 use std::time::Duration;
 
@@ -16,7 +16,7 @@ const PATIENCE: Duration = Duration::from_secs(2);
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     let source = &arguments.source;
-    match &arguments.action {
+    let done = match &arguments.action {
         GraphAction::Show { what } => show(&mut Source::open(source)?, what.as_deref(), source.json),
         GraphAction::Get { path } => get(&mut Source::open(source)?, path, source.json),
         GraphAction::Set { path, value } => set(source, path, value),
@@ -24,7 +24,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
             watch(source, filter.as_deref(), *count)
         }
         GraphAction::Export { format } => export(&mut Source::open(source)?, format),
-    }
+    };
+    done.map(|()| Answer::Yes)
 }
 
 /// Where the graph is.
@@ -70,19 +71,7 @@ pub(crate) fn read_graph(path: &Path) -> Result<Graph, Failure> {
     Ok(graph)
 }
 
-/// Prints; a reader that went away (`| head`) is no error.
-#[allow(clippy::unnecessary_wraps, reason = "reads as the end of a verb")]
-fn print(text: &str) -> Result<Answer, Failure> {
-    drop(std::io::stdout().write_all(text.as_bytes()));
-    Ok(Answer::Yes)
-}
-
-fn print_json(json: &serde_json::Value) -> Result<Answer, Failure> {
-    let text = serde_json::to_string_pretty(json).map_err(Failure::internal)?;
-    print(&format!("{text}\n"))
-}
-
-fn show(source: &mut Source, what: Option<&str>, as_json: bool) -> Result<Answer, Failure> {
+fn show(source: &mut Source, what: Option<&str>, as_json: bool) -> Result<(), Failure> {
     let snapshot = source.snapshot()?;
     if as_json && what.is_none() {
         return print_json(&json::to_json(&snapshot).map_err(Failure::internal)?);
@@ -118,7 +107,6 @@ fn show(source: &mut Source, what: Option<&str>, as_json: bool) -> Result<Answer
         }
         Ok(())
     };
-    let mut read = read;
     read().map_err(Failure::internal)?;
     print(&text)
 }
@@ -234,7 +222,7 @@ fn find_attribute(snapshot: &Snapshot, path: &str) -> Result<Attribute, Failure>
     found.ok_or_else(|| Failure::input(format!("{owner} has no attribute `{name}`")))
 }
 
-fn get(source: &mut Source, path: &str, as_json: bool) -> Result<Answer, Failure> {
+fn get(source: &mut Source, path: &str, as_json: bool) -> Result<(), Failure> {
     let snapshot = source.snapshot()?;
     let attribute = find_attribute(&snapshot, path)?;
     let value = json::value_to_json(&attribute.value);
@@ -248,7 +236,7 @@ fn get(source: &mut Source, path: &str, as_json: bool) -> Result<Answer, Failure
     }))
 }
 
-fn set(source: &GraphSource, path: &str, value: &str) -> Result<Answer, Failure> {
+fn set(source: &GraphSource, path: &str, value: &str) -> Result<(), Failure> {
     if source.file.is_some() {
         return Err(Failure::input("`graph set` changes a running system, not a file"));
     }
@@ -284,7 +272,7 @@ fn filter(snapshot: &Snapshot, name: Option<&str>) -> Result<Filter, Failure> {
     Ok(filter)
 }
 
-fn watch(source: &GraphSource, name: Option<&str>, count: Option<u64>) -> Result<Answer, Failure> {
+fn watch(source: &GraphSource, name: Option<&str>, count: Option<u64>) -> Result<(), Failure> {
     if source.file.is_some() {
         return Err(Failure::input("`graph watch` follows a running system, not a file"));
     }
@@ -298,7 +286,7 @@ fn watch(source: &GraphSource, name: Option<&str>, count: Option<u64>) -> Result
         match changes.next(snapshot.schema()).map_err(Failure::internal)? {
             None => {
                 if !session.instance().exists() {
-                    return Ok(Answer::Yes);
+                    return Ok(());
                 }
                 changes.wait(Duration::from_millis(100)).map_err(Failure::internal)?;
             }
@@ -316,7 +304,7 @@ fn watch(source: &GraphSource, name: Option<&str>, count: Option<u64>) -> Result
             }
         }
     }
-    Ok(Answer::Yes)
+    Ok(())
 }
 
 /// A commit in one line.
@@ -354,7 +342,7 @@ fn describe(snapshot: &Snapshot, change: &dsr::Change) -> String {
     format!("{} {:.3} s {}: {}", change.version, change.time.seconds(), change.agent, parts.join("; "))
 }
 
-fn export(source: &mut Source, format: &str) -> Result<Answer, Failure> {
+fn export(source: &mut Source, format: &str) -> Result<(), Failure> {
     let snapshot = source.snapshot()?;
     if format == "json" {
         return print_json(&json::to_json(&snapshot).map_err(Failure::internal)?);

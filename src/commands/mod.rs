@@ -2,8 +2,11 @@
 
 mod agent;
 mod graph;
+mod output;
 mod run;
 mod store;
+
+pub(crate) use agent::AGENTS;
 
 use crate::cli::Verb;
 use crate::{Answer, Failure};
@@ -41,7 +44,7 @@ fn load_grammar(text: &str, path: &Path) -> Result<Grammar, Failure> {
     };
     let (grammar, diagnostics) = grammar::load_grammar(text, &name, &mut include);
     if grammar::has_errors(&diagnostics) {
-        return Err(Failure::Input(grammar::Defects::new(diagnostics).into()));
+        return Err(Failure::Input(grammar::Defects { diagnostics }.into()));
     }
     Ok(grammar)
 }
@@ -49,7 +52,18 @@ fn load_grammar(text: &str, path: &Path) -> Result<Grammar, Failure> {
 /// The scenario's schema and grammar.
 fn load_rules(scenario: &Scenario) -> Result<(Schema, Grammar), Failure> {
     let grammar = load_grammar(&scenario.rules, &scenario.folder.join("rules.aggl"))?;
-    Ok((scenarios::schema(), grammar))
+    let schema = scenarios::schema().map_err(|error| Failure::Internal(error.into()))?;
+    Ok((schema, grammar))
+}
+
+/// Whether every mission's goal can be read under the grammar's types.
+fn check_goals(scenario: &Scenario, grammar: &Grammar) -> Result<(), Failure> {
+    for mission in &scenario.missions {
+        let file = scenario.folder.join(&mission.file).display().to_string();
+        grammar::parse_goal(&mission.goal, &file, &grammar.types)
+            .map_err(|defects| Failure::Input(defects.into()))?;
+    }
+    Ok(())
 }
 
 /// A flag that the first Ctrl-C or termination request sets; the second ends the program at once.

@@ -24,7 +24,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
             tracing::info!("restored version {}", image.version());
         }
         None => {
-            let initial = scenarios::initial_graph(&scenario, !arguments.no_social);
+            let mut initial = scenarios::initial_graph(&scenario);
+            initial.set(scenarios::WORLD, "social", !arguments.no_social);
             store.commit(&initial, scenario.start).map_err(Failure::internal)?;
         }
     }

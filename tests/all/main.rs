@@ -8,6 +8,8 @@
 mod architecture;
 mod dependencies;
 mod documentation;
+mod examples;
 mod graph;
+mod run;
 mod support;
 mod tree;

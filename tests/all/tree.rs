@@ -21,8 +21,8 @@ impl SourceFile {
     }
 }
 
-/// Folders that hold no sources.
-const NOT_OURS: [&str; 3] = ["target", "reports", "node_modules"];
+/// What the names of folders begin with that builds and runs write.
+const WRITTEN: [&str; 2] = ["target", "report"];
 
 /// The repository's root.
 pub(crate) fn root() -> PathBuf {
@@ -51,7 +51,8 @@ fn collect(folder: &Path, prefix: &str, files: &mut Vec<SourceFile>) {
         let kind = entry.file_type().unwrap();
         if kind.is_dir() {
             let hidden = name.starts_with('.') && name != ".ci" && name != ".cargo";
-            if !hidden && !NOT_OURS.contains(&name.as_str()) {
+            let written = prefix.is_empty() && WRITTEN.iter().any(|w| name.starts_with(w));
+            if !hidden && !written {
                 collect(&entry.path(), &format!("{path}/"), files);
             }
         } else if kind.is_file()

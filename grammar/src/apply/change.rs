@@ -3,8 +3,9 @@
 //! Guarantee: operations come in a fixed order, each can be carried out after those before it,
 //! and none is superfluous in the snapshot that they were made for.
 
-use crate::Name;
-use crate::matching::Slot;
+use super::ApplyError;
+use crate::matching::{Slot, compare, words};
+use crate::{Comparison, Name};
 use dsr::{
     EdgeKey, EdgeRef, NodeId, NodeRef, Operation, Owner, ReadError, Snapshot, Value, ValueKind,
 };
@@ -70,9 +71,15 @@ impl<'a> Changes<'a> {
         self.deleted.extend(end(node));
     }
 
-    pub(super) fn retype(&mut self, node: Slot, type_name: &str) {
-        if let Some(node) = end(node) {
-            self.retyped.insert(node, type_name.to_owned());
+    pub(super) fn retype(&mut self, node: Slot, type_name: &str) -> Result<(), ApplyError> {
+        let Some(node) = end(node) else { return Ok(()) };
+        match self.retyped.insert(node, type_name.to_owned()) {
+            Some(before) if before != type_name => Err(ApplyError::Contradiction {
+                what: "type of one node".to_owned(),
+                first: before,
+                second: type_name.to_owned(),
+            }),
+            _ => Ok(()),
         }
     }
 
@@ -88,10 +95,32 @@ impl<'a> Changes<'a> {
         }
     }
 
-    pub(super) fn assign_node(&mut self, node: Slot, attribute: &Name, value: Value) {
-        if let Some(node) = end(node) {
-            self.assigned
-                .insert((Target::Node(node), attribute.to_string()), value);
+    pub(super) fn assign_node(
+        &mut self,
+        node: Slot,
+        attribute: &Name,
+        value: Value,
+    ) -> Result<(), ApplyError> {
+        match end(node) {
+            Some(node) => self.assign(Target::Node(node), attribute, value),
+            None => Ok(()),
+        }
+    }
+
+    fn assign(&mut self, target: Target, attribute: &Name, value: Value) -> Result<(), ApplyError> {
+        let key = (target, attribute.to_string());
+        match self.assigned.get(&key) {
+            Some(before) if !compare(Comparison::Equal, before, &value) => {
+                Err(ApplyError::Contradiction {
+                    what: format!("`{attribute}` of one thing"),
+                    first: words(before),
+                    second: words(&value),
+                })
+            }
+            _ => {
+                self.assigned.insert(key, value);
+                Ok(())
+            }
         }
     }
 
@@ -100,10 +129,12 @@ impl<'a> Changes<'a> {
         (from, label, to): (Slot, &str, Slot),
         attribute: &Name,
         value: Value,
-    ) {
-        if let (Some(from), Some(to)) = (end(from), end(to)) {
-            let target = Target::Link((from, label.to_owned(), to));
-            self.assigned.insert((target, attribute.to_string()), value);
+    ) -> Result<(), ApplyError> {
+        match (end(from), end(to)) {
+            (Some(from), Some(to)) => {
+                self.assign(Target::Link((from, label.to_owned(), to)), attribute, value)
+            }
+            _ => Ok(()),
         }
     }
 

@@ -5,7 +5,7 @@
 
 use super::ApplyError;
 use super::change::Changes;
-use crate::matching::{Compiler, Environment, MatchDomain, Slot, Term, Test, for_each_choice};
+use crate::matching::{Compiler, Environment, MatchDomain, Slot, Term, Test};
 use crate::{AttributePath, Effect, Expression, MatchError, Name};
 use dsr::Snapshot;
 
@@ -167,7 +167,7 @@ impl Action {
                 value,
             } => {
                 let value = value.compute(snapshot, environment)?;
-                changes.assign_node(environment[*node], attribute, value);
+                changes.assign_node(environment[*node], attribute, value)?;
             }
             Self::AssignLink {
                 from,
@@ -178,25 +178,21 @@ impl Action {
             } => {
                 let value = value.compute(snapshot, environment)?;
                 let link = (environment[*from], label.as_str(), environment[*to]);
-                changes.assign_link(link, attribute, value);
+                changes.assign_link(link, attribute, value)?;
             }
             Self::Create { slot, type_name } => {
                 environment[*slot] = Slot::New(changes.create(type_name));
             }
             Self::Delete { node } => changes.delete(environment[*node]),
-            Self::Retype { node, type_name } => changes.retype(environment[*node], type_name),
+            Self::Retype { node, type_name } => {
+                changes.retype(environment[*node], type_name)?;
+            }
             Self::Forall {
                 first,
                 domains,
                 body,
             } => {
-                let mut visit = |environment: &mut Environment| {
-                    for action in body {
-                        action.run(snapshot, environment, changes)?;
-                    }
-                    Ok::<_, ApplyError>(None::<()>)
-                };
-                for_each_choice(snapshot, environment, *first, domains, &mut visit)?;
+                for_all(body, snapshot, environment, *first, domains, changes)?;
             }
             Self::When { condition, body } => {
                 if condition.holds(snapshot, environment)? {
@@ -208,6 +204,31 @@ impl Action {
         }
         Ok(())
     }
+}
+
+/// Runs the actions for every choice of nodes, by ascending ids, which the names of created nodes
+/// follow.
+fn for_all(
+    body: &[Action],
+    snapshot: &Snapshot,
+    environment: &mut Environment,
+    first: usize,
+    domains: &[MatchDomain],
+    changes: &mut Changes<'_>,
+) -> Result<(), ApplyError> {
+    let Some((domain, rest)) = domains.split_first() else {
+        for action in body {
+            action.run(snapshot, environment, changes)?;
+        }
+        return Ok(());
+    };
+    let mut nodes = domain.nodes(snapshot).collect::<Result<Vec<_>, _>>()?;
+    nodes.sort_unstable();
+    for node in nodes {
+        environment[first] = Slot::Node(node);
+        for_all(body, snapshot, environment, first + 1, rest, changes)?;
+    }
+    Ok(())
 }
 
 impl Computed {

@@ -5,7 +5,7 @@
 //!
 //! Where the parts of a rule contradict each other: what the right side (or a creating effect)
 //! wants is there afterwards even if an effect unlinks it; a deleted node is gone with whatever
-//! else was said of it.
+//! else was said of it; two values for one attribute, or two types for one node, are refused.
 
 mod change;
 mod effect;
@@ -47,6 +47,16 @@ pub enum ApplyError {
     Undefined {
         /// The expression.
         expression: String,
+    },
+    /// Effects set one thing to two values; effects happen at once, so that neither comes last.
+    #[error("the rule sets the {what} both to {first} and to {second}")]
+    Contradiction {
+        /// What is set.
+        what: String,
+        /// To one value
+        first: String,
+        /// and to another.
+        second: String,
     },
     /// The rule could not be looked at.
     #[error(transparent)]
@@ -135,7 +145,7 @@ fn sides(
         };
         if left.type_name != node.type_name {
             let slot = compiler.slot(&node.variable)?;
-            changes.retype(environment[slot], &node.type_name);
+            changes.retype(environment[slot], &node.type_name)?;
         }
     }
     for node in &rule.left.nodes {

@@ -1,8 +1,13 @@
 //! Rules applied through the store, on graphs that are written out.
 
+use crate::testing::oracle::{Model, TYPES};
+use crate::testing::random::FEW;
+use crate::testing::repair::repaired;
 use crate::testing::{CARE, apply, care_centre, describe, graph, read, rule};
 use crate::{ApplyError, Binding, Obstacle};
+use crate::{Grammar, parse_grammar};
 use dsr::{Time, Transaction, Value};
+use proptest::prelude::*;
 
 #[test]
 fn the_robot_crosses_the_care_centre_and_takes_a_persons_attention() {
@@ -230,6 +235,40 @@ fn the_right_side_wins_over_an_effect_that_unlinks_it() {
 }
 
 #[test]
+fn a_link_that_is_there_stays_if_the_right_side_wants_it() {
+    let grammar =
+        rule("{ a:pose } => { a:pose a->a(reach) } effect { (forall p:pose (not (reach p p))) }");
+    let mut poses = graph(&[("pose", "a")], &[("a", "reach", "a")]);
+    apply(&mut poses, &grammar, "r", &[("a", "a")]).unwrap();
+    assert_eq!(describe(&poses), ["a->a(reach)", "a:pose"]);
+}
+
+#[test]
+fn two_values_for_one_attribute_are_refused() {
+    let grammar = rule(
+        "{ a:lamp } => { a:lamp } effect {
+            (forall b:lamp (when (not (= a b)) (assign a.level b.level))) }",
+    );
+    let lamps = |levels: [f64; 2]| {
+        let mut lamps = graph(&[("lamp", "x"), ("lamp", "y"), ("lamp", "z")], &[]);
+        let mut transaction = Transaction::new();
+        transaction.set("y", "level", levels[0]);
+        transaction.set("z", "level", levels[1]);
+        lamps.commit(&transaction, "test", Time::default()).unwrap();
+        lamps
+    };
+    assert_eq!(
+        apply(&mut lamps([2.0, 2.0]), &grammar, "r", &[("a", "x")]),
+        Ok(())
+    );
+    let refusal = apply(&mut lamps([2.0, 3.0]), &grammar, "r", &[("a", "x")]).unwrap_err();
+    assert!(
+        refusal.ends_with("sets the `level` of one thing both to 2 and to 3"),
+        "{refusal}"
+    );
+}
+
+#[test]
 fn what_a_rule_aims_at_is_recognised_where_somebody_else_brought_it_about() {
     let grammar = read(CARE);
     let mut centre = care_centre();
@@ -268,4 +307,34 @@ fn what_a_rule_aims_at_is_recognised_where_somebody_else_brought_it_about() {
             .unwrap(),
         None
     );
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    #[test]
+    fn applying_does_what_the_oracle_does(model in Model::strategy(), rule in FEW.rule()) {
+        let (mut grammar, _): (Grammar, _) = parse_grammar(TYPES, "types.aggl");
+        grammar.rules.push(repaired(rule));
+        let rule = &grammar.rules[0];
+        let all = model.assignments(rule);
+        let mut matches: Vec<_> = all.iter().filter(|at| model.rule_holds(rule, at)).collect();
+        matches.truncate(3);
+        for at in matches {
+            let mut graph = model.to_graph();
+            let binding: Vec<(&str, &str)> =
+                at.iter().map(|(variable, name)| (variable.as_str(), name.as_str())).collect();
+            let done = apply(&mut graph, &grammar, "r", &binding);
+            match model.applied(rule, at) {
+                Some(expected) => {
+                    prop_assert_eq!(&done, &Ok(()), "{}", rule);
+                    prop_assert_eq!(Model::of_graph(&graph), expected, "{} at {:?}", rule, at);
+                }
+                None => {
+                    prop_assert!(done.is_err(), "{} at {:?}", rule, at);
+                    prop_assert_eq!(&Model::of_graph(&graph), &model);
+                }
+            }
+        }
+    }
 }

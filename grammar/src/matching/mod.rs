@@ -13,7 +13,8 @@ pub use obstacle::{End, Obstacle};
 pub use search::Matches;
 
 pub(crate) use domain::Domain as MatchDomain;
-pub(crate) use evaluate::{Environment, Number, for_each_choice};
+pub(crate) use evaluate::{Environment, Number, compare};
+pub(crate) use obstacle::words;
 pub(crate) use program::{Compiler, Link, Slot, Term, Test};
 pub(crate) use search::Problem;
 
@@ -357,3 +358,6 @@ pub(crate) fn conjuncts(condition: &Condition) -> Vec<&Condition> {
         other => vec![other],
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -56,19 +56,24 @@ impl Parser<'_> {
         }
     }
 
-    /// One formula; a word or number by itself is one, too.
+    /// One formula; a word or number by itself is one, too. Reads at least one token.
     pub(super) fn form(&mut self, depth: usize) -> Option<Form> {
         let token = self.peek()?.clone();
         let at = self.at;
         match token.kind {
             TokenKind::Symbol("(") => self.list(depth),
             TokenKind::Word if self.begins_edge_path(at) => self.edge_path(),
+            TokenKind::Word | TokenKind::Number
+                if self.is_symbol_at(at + 1, ":")
+                    && (token.kind == TokenKind::Word || self.is_digits(at)) =>
+            {
+                let variable = self.bump_name();
+                self.bump();
+                let type_name = self.name("a type")?;
+                Some(Form::Typed(PatternNode::new(variable, type_name)))
+            }
             TokenKind::Word => {
                 let name = self.bump_name();
-                if self.eat(":") {
-                    let type_name = self.name("a type")?;
-                    return Some(Form::Typed(PatternNode::new(name, type_name)));
-                }
                 self.maybe_path(name, Form::Word)
             }
             TokenKind::Number => {

@@ -85,7 +85,7 @@ impl Parser<'_> {
         let span = form.span();
         if let Form::List(mut items, _) = form
             && !items.is_empty()
-            && let Form::Word(head) = items.remove(0)
+            && let Form::Word(head) | Form::Number(_, head) = items.remove(0)
         {
             return Some((head, items, span));
         }
@@ -341,6 +341,7 @@ impl Parser<'_> {
         keywords: &[&str],
         span: Span,
     ) -> Option<(Name, Name, Name)> {
+        // A number such as `-4.5` in front names nothing.
         let is_name = label.chars().all(|c| c.is_alphanumeric() || c == '_');
         if !is_name {
             self.wanted(label.span(), "a label or an operator", None);

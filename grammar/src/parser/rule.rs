@@ -203,11 +203,10 @@ impl Parser<'_> {
 
     fn body(&mut self, header: Option<Header>) -> Option<Action> {
         let opening = self.expect("{", "`{` and the rule's body")?;
-        if self
+        let word = self
             .peek()
-            .is_some_and(|token| token.kind == TokenKind::Word)
-            && !self.at_section()
-        {
+            .is_some_and(|token| token.kind == TokenKind::Word);
+        if (word && !self.at_section()) || self.is_digits(self.at) {
             return self.combo_body(header, opening);
         }
         let Some(left) = self.graph("`{` and the left side") else {
@@ -357,8 +356,9 @@ impl Parser<'_> {
         }
         self.bump();
         let alias = self.name("an alias")?;
-        // A rule may itself be called `optional`: then `as` follows.
-        let optional = self.is_word("optional") && self.token_text(self.at + 1) != "as";
+        // On the next line it would be the rule of the next step.
+        let optional =
+            self.is_word("optional") && self.peek().is_some_and(|token| !token.first_on_line);
         if optional {
             self.bump();
         }

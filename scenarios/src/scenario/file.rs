@@ -176,10 +176,21 @@ fn whole(table: &Table<'_>, text: &str, read: Read<'_>) -> Scenario {
     let objects = space::objects(table, &mut names, &rooms);
     let cameras = devices::cameras(table, &mut names);
     let robot = devices::robot(table, &mut names);
-    space::check_robot(table, &robot, &rooms, &walls, &objects);
+    let body = (robot.pose.translation.vector.into(), robot.radius);
+    let span = table.span_of("robot");
+    space::check_body(
+        table,
+        &rooms,
+        &walls,
+        objects.iter(),
+        body,
+        "the robot",
+        span,
+    );
     let scene = people::Scene {
         day: begin.date(),
         rooms: &rooms,
+        walls: &walls,
         places: &places,
         objects: &objects,
     };
@@ -293,12 +304,11 @@ fn tracks(scenario: &Table<'_>) -> TracksFrame {
     let Some(table) = scenario.table("tracks") else {
         return TracksFrame::default();
     };
-    let [x, y] = table
-        .get("translation")
-        .map_or([0.0; 2], |translation| translation.value);
-    let rotation = table.number("rotation", Bound::Any, 0.0);
     let tracks = TracksFrame {
-        world_from_recording: Isometry2::new(Vector2::new(x, y), rotation),
+        translation: table
+            .get::<[f64; 2]>("translation")
+            .map(|at| at.value.into()),
+        rotation: table.number("rotation", Bound::Any, 0.0),
         offset: table.number("offset", Bound::NotNegative, 0.0),
     };
     table.close();

@@ -3,11 +3,12 @@
 use super::diagnostic::ProblemKind;
 use super::file::{Kind, Names, point, pose, time_of_day};
 use super::reader::{Bound, Located, Table};
-use super::space::check_inside;
+use super::space::{check_body, check_inside};
 use super::value::Value;
-use super::{Begin, Entry, Face, Object, Person, Place, Room, Stream};
+use super::{Begin, Entry, Face, Object, Person, Place, Room, Stream, Wall};
 use jiff::civil::Date;
 use nalgebra::Point2;
+use std::ops::Range;
 use toml::de::DeValue;
 
 /// The radius of a standing adult's body, seen from above, m.
@@ -17,8 +18,25 @@ const BODY_RADIUS: f64 = 0.2;
 pub(super) struct Scene<'a> {
     pub(super) day: Date,
     pub(super) rooms: &'a [Room],
+    pub(super) walls: &'a [Wall],
     pub(super) places: &'a [Place],
     pub(super) objects: &'a [Object],
+}
+
+impl Scene<'_> {
+    /// Notes that nobody can stand (or sit on a seat) here.
+    fn check_standing(&self, table: &Table<'_>, at: Point2<f64>, what: &str, span: Range<usize>) {
+        let solid = self.objects.iter().filter(|object| object.class != "seat");
+        check_body(
+            table,
+            self.rooms,
+            self.walls,
+            solid,
+            (at, BODY_RADIUS),
+            what,
+            span,
+        );
+    }
 }
 
 /// Where to go or to look, as written.
@@ -69,7 +87,7 @@ pub(super) fn people(
         if let Some(name) = name {
             let at = pose.translation.vector.into();
             let what = format!("person `{name}`");
-            check_inside(&table, scene.rooms, at, what, table.span_of("pose"));
+            scene.check_standing(&table, at, &what, table.span_of("pose"));
             people.push(person);
         }
         table.close();
@@ -102,6 +120,9 @@ fn read_entry(
     table.allow("at");
     table.allow("after");
     let (go, arrival) = go(table, names, scene).unzip();
+    if let Some(at) = go {
+        scene.check_standing(table, at, "who goes here", table.span_of("go"));
+    }
     let face = face(table, names, scene, people).or(arrival.flatten());
     let leave = table.get("leave").is_some_and(|leave| leave.value);
     if !["go", "face", "leave", "after"]
@@ -127,10 +148,7 @@ fn go(
     let target = table.get::<Target>("go")?;
     let name = match target.value {
         Target::Point([x, y]) => {
-            let at = Point2::new(x, y);
-            let what = "the point to go to".to_owned();
-            check_inside(table, scene.rooms, at, what, target.span);
-            return Some((at, None));
+            return Some((Point2::new(x, y), None));
         }
         Target::Heading(_) => {
             let expected = "a name or a point [x, y]";

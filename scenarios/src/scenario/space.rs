@@ -4,7 +4,7 @@ use super::diagnostic::ProblemKind;
 use super::file::{Kind, Names, point, pose};
 use super::geometry::{self, Fit, distance_to_wall};
 use super::reader::{Bound, Located, Table};
-use super::{Door, Object, Place, Robot, Room, Shape, Wall};
+use super::{Door, Object, Place, Room, Shape, Wall};
 use crate::scenario::diagnostic::suggest;
 use nalgebra::{Point2, Vector2};
 use std::ops::Range;
@@ -282,29 +282,24 @@ fn shape(table: &Table<'_>) -> Shape {
     }
 }
 
-/// Notes a robot that starts in no room, or inside something.
-pub(super) fn check_robot(
-    scenario: &Table<'_>,
-    robot: &Robot,
+/// Notes that a body of this radius at `at` is in no room, or in a wall or one of the objects.
+pub(super) fn check_body<'a>(
+    table: &Table<'_>,
     rooms: &[Room],
     walls: &[Wall],
-    objects: &[Object],
+    mut objects: impl Iterator<Item = &'a Object>,
+    body: (Point2<f64>, f64),
+    what: &str,
+    span: Range<usize>,
 ) {
-    let at = Point2::from(robot.pose.translation.vector);
-    let span = scenario.span_of("robot");
-    check_inside(scenario, rooms, at, "the robot".to_owned(), span.clone());
-    let wall = walls
-        .iter()
-        .any(|wall| distance_to_wall(at, wall) < robot.radius);
-    let object = objects
-        .iter()
-        .find(|object| object.distance(at) < robot.radius);
-    let obstacle = object
-        .map(|o| format!("`{}`", o.name))
-        .or(wall.then(|| "a wall".to_owned()));
-    if let Some(obstacle) = obstacle {
-        let what = "the robot".to_owned();
-        scenario
+    let (at, radius) = body;
+    check_inside(table, rooms, at, what.to_owned(), span.clone());
+    let object = objects.find(|object| object.distance(at) < radius);
+    let wall = walls.iter().any(|wall| distance_to_wall(at, wall) < radius);
+    let obstacle = object.map(|object| format!("`{}`", object.name));
+    if let Some(obstacle) = obstacle.or(wall.then(|| "a wall".to_owned())) {
+        let what = what.to_owned();
+        table
             .problems
             .add(ProblemKind::NoSpace { what, obstacle }, span);
     }

@@ -360,6 +360,9 @@ fn each_kind_of_mistake_is_told_apart() {
         ("[7.0, 1.0, 0.5]", "[7.0, 1.0]", |p| {
             matches!(p, P::WrongType { .. })
         }),
+        ("[2.0, 2.0], face", "[0.1, 2.0], face", |p| {
+            matches!(p, P::NoSpace { .. })
+        }),
         ("go = \"desk\"", "go = \"dusk\"", |p| {
             matches!(p, P::UnknownName { .. })
         }),

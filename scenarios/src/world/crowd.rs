@@ -74,7 +74,7 @@ impl Crowd {
         let start = scenario.start;
         let source = if let Some(tracks) = tracks {
             Source::Recorded {
-                tracks: tracks.placed(&scenario.tracks),
+                tracks: tracks.placed(&scenario.tracks, scenario.bounds),
                 start,
             }
         } else {

@@ -1,5 +1,10 @@
 //! What the tests share: instances that leave nothing behind and processes that end with them.
 
+mod program;
+
+pub(crate) use crate::tree::root;
+pub(crate) use program::{Program, Run};
+
 use dsr::Instance;
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, ChildStdout, Command, Stdio};
@@ -14,6 +19,11 @@ impl TestInstance {
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
         let name = format!("t{}-{count}-{test}", std::process::id());
         Self(Instance::new(&name).unwrap())
+    }
+
+    /// The instance of that name, which another run of the same test used.
+    pub(crate) fn named(name: &str) -> Self {
+        Self(Instance::new(name).unwrap())
     }
 
     pub(crate) fn name(&self) -> &str {

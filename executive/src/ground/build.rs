@@ -1,0 +1,592 @@
+//! From what may come to hold to a ground task. This file guarantees that facts that never change
+//! are compiled away, that actions which cannot matter to the goal are left out, and that the task
+//! has a plan of a cost exactly where the rules have.
+
+use super::effects::{Guard, Primitive, each_choice, each_primitive};
+use super::facts::Facts;
+use super::program::{Environment, Link, Object, Operator, Place, Program, Quantified, Test};
+use super::reach::{Choice, Instance, Reached, choices, combinations, read};
+use super::value::{amount, compare, evaluate};
+use super::vocabulary::TypeSet;
+use crate::task::{Action, Effect, Fact, Formula, Literal, Micro, Task, micro};
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::BTreeMap;
+
+/// Something that holds or not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) enum Atom {
+    Link(Link),
+    /// The object exists and is of that exact type.
+    Type(Object, u16),
+    /// The operator has used its spare of that number.
+    Used(usize, usize),
+    /// The operator is not dormant any more.
+    Awake(usize),
+    /// The place has the value of that number.
+    Value(Place, usize),
+}
+
+/// A ground task and what its actions are.
+#[derive(Debug)]
+pub(crate) struct Ground {
+    pub(crate) task: Task,
+    /// The instance that each action is, by its number in [`Reached::instances`].
+    pub(crate) actions: Vec<usize>,
+    /// What each action costs without what was added to it.
+    pub(crate) costs: Vec<Micro>,
+    /// The facts of the task.
+    pub(crate) atoms: Vec<Atom>,
+    /// Rules whose cost has no value somewhere.
+    pub(crate) notes: Vec<String>,
+}
+
+/// What an instance costs besides its rule's cost; infinity excludes it.
+pub(crate) type Extra<'a> = dyn Fn(&Instance) -> f64 + 'a;
+
+struct Builder<'a> {
+    program: &'a Program,
+    initial: &'a Facts,
+    awake: &'a [bool],
+    reached: &'a Reached,
+    /// Spares that some instance uses.
+    used: FxHashSet<(usize, usize)>,
+    deleted: FxHashSet<Atom>,
+    numbers: FxHashMap<Atom, Fact>,
+    atoms: Vec<Atom>,
+}
+
+/// The changes of an action before facts have numbers: by condition, what is added and deleted.
+type Changes = BTreeMap<Formula, (Vec<Atom>, Vec<Atom>)>;
+
+/// Builds the task. `awake` tells which operators are not dormant at first.
+pub(crate) fn build(
+    program: &Program,
+    goal: &Operator,
+    initial: &Facts,
+    awake: &[bool],
+    reached: &Reached,
+    extra: &Extra<'_>,
+) -> Ground {
+    let mut builder = Builder {
+        program,
+        initial,
+        awake,
+        reached,
+        used: FxHashSet::default(),
+        deleted: FxHashSet::default(),
+        numbers: FxHashMap::default(),
+        atoms: Vec::new(),
+    };
+    for instance in &reached.instances {
+        builder.used.insert((instance.operator, instance.spare));
+        builder.collect_deleted(instance);
+    }
+    let goals = reached.goals.iter();
+    let wanted = goals.map(|environment| builder.demand(goal, &mut environment.clone()));
+    let wanted: Vec<Formula> = wanted.collect();
+    let wanted = Formula::any(wanted);
+    let mut drafts: Vec<(usize, Formula, Changes, Micro, Micro)> = Vec::new();
+    let mut notes = Vec::new();
+    for (index, instance) in reached.instances.iter().enumerate() {
+        let operator = &program.operators[instance.operator];
+        let more = extra(instance);
+        let value = evaluate(&operator.cost, &mut |place| {
+            initial.value(place.at(&instance.objects)).cloned()
+        });
+        let Some(cost) = amount(value.as_ref()) else {
+            let note = format!(
+                "the cost of rule `{}` has no value somewhere",
+                operator.name
+            );
+            if !notes.contains(&note) {
+                notes.push(note);
+            }
+            continue;
+        };
+        if more.is_infinite() {
+            continue;
+        }
+        let (precondition, changes) = builder.action(instance);
+        if precondition != Formula::FALSE {
+            drafts.push((
+                index,
+                precondition,
+                changes,
+                micro(cost),
+                micro(cost + more),
+            ));
+        }
+    }
+    let mut actions = Vec::new();
+    let (mut which, mut costs) = (Vec::new(), Vec::new());
+    for (index, precondition, changes, cost, raised) in drafts {
+        let number = |atoms: Vec<Atom>| -> Vec<Fact> {
+            let known = atoms.iter().filter_map(|atom| builder.numbers.get(atom));
+            let mut facts: Vec<Fact> = known.copied().collect();
+            facts.sort_unstable();
+            facts.dedup();
+            facts
+        };
+        let mut effects: Vec<Effect> = Vec::new();
+        for (condition, (add, delete)) in changes {
+            let (add, delete) = (number(add), number(delete));
+            if !(add.is_empty() && delete.is_empty()) {
+                effects.push(Effect {
+                    condition,
+                    add,
+                    delete,
+                });
+            }
+        }
+        if effects.is_empty() {
+            continue;
+        }
+        let operator = &program.operators[reached.instances[index].operator];
+        let mut action = Action::new(precondition, effects, raised);
+        action.success = operator.success;
+        actions.push(action);
+        which.push(index);
+        costs.push(cost);
+    }
+    let relevant = relevant(builder.atoms.len(), &wanted, &actions);
+    let keep = |index: usize| relevant[index];
+    let holding = |&fact: &Fact| builder.holds_at_first(builder.atoms[fact as usize]);
+    let first: Vec<Fact> = (0..builder.atoms.len() as Fact).filter(holding).collect();
+    Ground {
+        task: Task::new(builder.atoms.len(), &first, wanted, filter(actions, keep)),
+        actions: filter(which, keep),
+        costs: filter(costs, keep),
+        atoms: builder.atoms,
+        notes,
+    }
+}
+
+fn filter<T>(list: Vec<T>, keep: impl Fn(usize) -> bool) -> Vec<T> {
+    let kept = list
+        .into_iter()
+        .enumerate()
+        .filter(|(index, _)| keep(*index));
+    kept.map(|(_, item)| item).collect()
+}
+
+/// Which actions may matter to the goal: those that bring about what it, or another such action,
+/// asks for.
+fn relevant(facts: usize, goal: &Formula, actions: &[Action]) -> Vec<bool> {
+    let mut makers: Vec<Vec<usize>> = vec![Vec::new(); facts * 2];
+    for (index, action) in actions.iter().enumerate() {
+        for effect in &action.effects {
+            let added = effect.add.iter().map(|&f| Literal::positive(f));
+            let deleted = effect.delete.iter().map(|&f| Literal::negative(f));
+            for literal in added.chain(deleted) {
+                makers[literal.index()].push(index);
+            }
+        }
+    }
+    let mut wanted = vec![false; facts * 2];
+    let mut relevant = vec![false; actions.len()];
+    let mut open = Vec::new();
+    goal.each_literal(&mut |literal| open.push(literal));
+    while let Some(literal) = open.pop() {
+        if std::mem::replace(&mut wanted[literal.index()], true) {
+            continue;
+        }
+        for &index in &makers[literal.index()] {
+            if !std::mem::replace(&mut relevant[index], true) {
+                let action = &actions[index];
+                let visit = &mut |literal| open.push(literal);
+                action.precondition.each_literal(visit);
+                for effect in &action.effects {
+                    effect.condition.each_literal(visit);
+                }
+            }
+        }
+    }
+    relevant
+}
+
+impl<'a> Builder<'a> {
+    fn holds_at_first(&self, atom: Atom) -> bool {
+        match atom {
+            Atom::Link(link) => self.initial.has_link(link),
+            Atom::Type(object, exact) => self.initial.types(object).contains(&exact),
+            Atom::Used(..) => false,
+            Atom::Awake(operator) => self.awake[operator],
+            Atom::Value(_, value) => value == 0,
+        }
+    }
+
+    fn may_hold(&self, atom: Atom) -> bool {
+        match atom {
+            Atom::Link(link) => self.reached.facts.has_link(link),
+            Atom::Type(object, exact) => self.reached.facts.types(object).contains(&exact),
+            Atom::Used(operator, spare) => self.used.contains(&(operator, spare)),
+            Atom::Awake(operator) => self.reached.awake[operator],
+            Atom::Value(place, value) => value < self.reached.facts.values(place).len(),
+        }
+    }
+
+    /// An atom or its negation, as a constant where it never changes.
+    fn literal(&mut self, atom: Atom, positive: bool) -> Formula {
+        if !self.may_hold(atom) {
+            return Formula::constant(!positive);
+        }
+        if self.holds_at_first(atom) && !self.deleted.contains(&atom) {
+            return Formula::constant(positive);
+        }
+        let next = self.atoms.len() as Fact;
+        let fact = *self.numbers.entry(atom).or_insert(next);
+        if fact == next {
+            self.atoms.push(atom);
+        }
+        Formula::Literal(if positive {
+            Literal::positive(fact)
+        } else {
+            Literal::negative(fact)
+        })
+    }
+
+    fn of_type(&mut self, object: Object, types: &TypeSet, positive: bool) -> Formula {
+        let reached = self.reached;
+        let exact = reached.facts.types(object).iter().copied();
+        let parts: Vec<Formula> = exact
+            .filter(|&exact| types.contains(usize::from(exact)))
+            .map(|exact| self.literal(Atom::Type(object, exact), positive))
+            .collect();
+        combine(parts, positive)
+    }
+
+    fn test(&mut self, test: &Test, environment: &mut Environment, positive: bool) -> Formula {
+        match test {
+            Test::Link(link) => self.literal(Atom::Link(link.at(environment)), positive),
+            Test::Same(a, b) => {
+                let same = environment[*a as usize] == environment[*b as usize];
+                Formula::constant(same == positive)
+            }
+            Test::Compare(operator, left, right) => {
+                let reached = &self.reached.facts;
+                let all = choices(&[left, right], environment, reached, self.program);
+                let mut parts = Vec::new();
+                for choice in all {
+                    let mut look = |place: Place| read(place.at(environment), &choice, reached);
+                    let (left, right) = (evaluate(left, &mut look), evaluate(right, &mut look));
+                    if compare(*operator, left.as_ref(), right.as_ref()) == positive {
+                        parts.push(self.choice(&choice, true));
+                    }
+                }
+                Formula::any(parts)
+            }
+            Test::Not(inner) => self.test(inner, environment, !positive),
+            Test::All(parts) => {
+                let parts: Vec<Formula> = parts
+                    .iter()
+                    .map(|part| self.test(part, environment, positive))
+                    .collect();
+                combine(parts, !positive)
+            }
+            Test::Any(parts) => {
+                let parts: Vec<Formula> = parts
+                    .iter()
+                    .map(|part| self.test(part, environment, positive))
+                    .collect();
+                combine(parts, positive)
+            }
+            Test::Exists(quantified) => self.quantified(quantified, environment, positive, true),
+            Test::Forall(quantified) => self.quantified(quantified, environment, positive, false),
+        }
+    }
+
+    fn quantified(
+        &mut self,
+        quantified: &Quantified<Box<Test>>,
+        environment: &mut Environment,
+        positive: bool,
+        exists: bool,
+    ) -> Formula {
+        let reached = self.reached;
+        let mut parts = Vec::new();
+        // A choice counts where all chosen exist and (for `exists`) the body holds; the negation
+        // of `forall` is an `exists` of the body's negation.
+        let body = positive == exists;
+        each_choice(
+            quantified,
+            &reached.facts,
+            environment,
+            &mut |environment, chosen| {
+                let body = if body {
+                    self.test(&quantified.body, environment, exists)
+                } else {
+                    self.test(&quantified.body, environment, !exists)
+                };
+                let there = chosen
+                    .iter()
+                    .zip(&quantified.domains)
+                    .map(|(&object, types)| self.of_type(object, types, positive == exists));
+                let mut one: Vec<Formula> = there.collect();
+                one.push(body);
+                parts.push(combine(one, positive != exists));
+            },
+        );
+        combine(parts, positive == exists)
+    }
+
+    /// That some places have the chosen values, or that not all have.
+    fn choice(&mut self, choice: &Choice, positive: bool) -> Formula {
+        let parts: Vec<Formula> = choice
+            .iter()
+            .map(|&(place, value)| self.literal(Atom::Value(place, value), positive))
+            .collect();
+        combine(parts, !positive)
+    }
+
+    /// What an operator or a goal asks for at a binding.
+    fn demand(&mut self, operator: &Operator, environment: &mut Environment) -> Formula {
+        let mut parts = Vec::new();
+        for (slot, variable) in operator.variables[..operator.bound].iter().enumerate() {
+            parts.push(self.of_type(environment[slot], &variable.types, true));
+        }
+        for link in &operator.links {
+            parts.push(self.literal(Atom::Link(link.at(environment)), true));
+        }
+        for link in &operator.absent {
+            parts.push(self.literal(Atom::Link(link.at(environment)), false));
+        }
+        for test in &operator.tests {
+            parts.push(self.test(test, environment, true));
+        }
+        Formula::all(parts)
+    }
+
+    fn action(&mut self, instance: &Instance) -> (Formula, Changes) {
+        let number = instance.operator;
+        let program = self.program;
+        let operator = &program.operators[number];
+        let mut environment = instance.objects.clone();
+        let mut needs = vec![self.demand(operator, &mut environment)];
+        let mut changes = Changes::new();
+        if operator.dormant {
+            needs.push(self.literal(Atom::Awake(number), true));
+        }
+        for &woken in &operator.wakes {
+            let always = changes.entry(Formula::TRUE).or_default();
+            always.0.push(Atom::Awake(woken));
+        }
+        if operator.creates() {
+            // Spares are interchangeable: they are used in their order.
+            needs.push(self.literal(Atom::Used(number, instance.spare), false));
+            if let Some(before) = instance.spare.checked_sub(1) {
+                needs.push(self.literal(Atom::Used(number, before), true));
+            }
+            let always = changes.entry(Formula::TRUE).or_default();
+            always.0.push(Atom::Used(number, instance.spare));
+        }
+        let mut primitives: Vec<(Formula, Primitive<'a>)> = Vec::new();
+        let mut gone = Vec::new();
+        let reached = self.reached;
+        let mut visit = |guards: &[Guard<'a>], primitive: Primitive<'a>| {
+            let parts: Vec<Formula> = guards
+                .iter()
+                .map(|guard| match guard {
+                    Guard::Test(test, at) => self.test(test, &mut at.clone(), true),
+                    Guard::OfType(object, types) => self.of_type(*object, types, true),
+                })
+                .collect();
+            let condition = Formula::all(parts);
+            if condition == Formula::FALSE {
+                return;
+            }
+            if let Primitive::Delete(object) = primitive
+                && condition == Formula::TRUE
+            {
+                gone.push(object);
+            }
+            primitives.push((condition, primitive));
+        };
+        each_primitive(
+            &operator.changes,
+            &reached.facts,
+            &mut environment,
+            &mut Vec::new(),
+            &mut visit,
+        );
+        if operator.strict {
+            needs.push(self.no_dangling(&primitives));
+        }
+        for (condition, primitive) in primitives {
+            self.change(condition, primitive, &gone, &mut needs, &mut changes);
+        }
+        (Formula::all(needs), changes)
+    }
+
+    fn change(
+        &mut self,
+        condition: Formula,
+        primitive: Primitive<'_>,
+        gone: &[Object],
+        needs: &mut Vec<Formula>,
+        changes: &mut Changes,
+    ) {
+        let lasting = |link: Link| !gone.contains(&link.from) && !gone.contains(&link.to);
+        let condition = self.needed_condition(condition, &primitive);
+        match primitive {
+            Primitive::Link(link) => {
+                if lasting(link) {
+                    let entry = changes.entry(condition).or_default();
+                    entry.0.push(Atom::Link(link));
+                }
+            }
+            Primitive::Unlink(link) => {
+                let entry = changes.entry(condition).or_default();
+                entry.1.push(Atom::Link(link));
+            }
+            Primitive::Create(object, exact) => {
+                let entry = changes.entry(condition).or_default();
+                entry.0.push(Atom::Type(object, exact));
+            }
+            Primitive::Retype(object, exact) => {
+                if !gone.contains(&object) {
+                    let others = self.types_of(object);
+                    let entry = changes.entry(condition).or_default();
+                    entry.0.push(Atom::Type(object, exact));
+                    entry.1.extend(others);
+                }
+            }
+            Primitive::Delete(object) => {
+                let types = self.types_of(object);
+                let links = self.reached.facts.links_at(object);
+                let entry = changes.entry(condition).or_default();
+                entry.1.extend(types);
+                entry.1.extend(links.into_iter().map(Atom::Link));
+            }
+            Primitive::Assign(place, term, at) => {
+                if !self.program.assigned[usize::from(place.attribute())] {
+                    return;
+                }
+                for (choice, value) in combinations(term, &at, &self.reached.facts, self.program) {
+                    let values = self.reached.facts.values(place);
+                    let index = value
+                        .and_then(|value| values.iter().position(|v| v.as_ref() == Some(&value)));
+                    let others = 0..values.len();
+                    if let Some(index) = index {
+                        let chosen = self.choice(&choice, true);
+                        let both = Formula::all([condition.clone(), chosen]);
+                        if both == Formula::FALSE {
+                            continue;
+                        }
+                        let entry = changes.entry(both).or_default();
+                        entry.0.push(Atom::Value(place, index));
+                        let others = others.filter(|&other| other != index);
+                        entry
+                            .1
+                            .extend(others.map(|other| Atom::Value(place, other)));
+                    } else {
+                        // Without a value, the rule is refused.
+                        let not_chosen = self.choice(&choice, false);
+                        let not_guarded = negation(&condition);
+                        needs.push(Formula::any([not_chosen, not_guarded]));
+                    }
+                }
+            }
+        }
+    }
+
+    /// That a link goes if it is there, or comes if it is not, needs no condition.
+    fn needed_condition(&self, condition: Formula, primitive: &Primitive<'_>) -> Formula {
+        let (link, there) = match primitive {
+            Primitive::Link(link) => (link, false),
+            Primitive::Unlink(link) => (link, true),
+            _ => return condition,
+        };
+        match (&condition, self.numbers.get(&Atom::Link(*link))) {
+            (Formula::Literal(literal), Some(&fact))
+                if literal.fact() == fact && literal.negated() != there =>
+            {
+                Formula::TRUE
+            }
+            _ => condition,
+        }
+    }
+
+    fn types_of(&self, object: Object) -> Vec<Atom> {
+        let types = self.reached.facts.types(object).iter();
+        types.map(|&exact| Atom::Type(object, exact)).collect()
+    }
+
+    /// That a strict rule leaves no link hanging.
+    fn no_dangling(&mut self, primitives: &[(Formula, Primitive<'_>)]) -> Formula {
+        let mut parts = Vec::new();
+        for (condition, primitive) in primitives {
+            let Primitive::Delete(object) = primitive else {
+                continue;
+            };
+            for link in self.reached.facts.links_at(*object) {
+                let unlinked = primitives
+                    .iter()
+                    .any(|(_, other)| matches!(other, Primitive::Unlink(l) if *l == link));
+                if !unlinked {
+                    let absent = self.literal(Atom::Link(link), false);
+                    parts.push(Formula::any([absent, negation(condition)]));
+                }
+            }
+        }
+        Formula::all(parts)
+    }
+
+    /// Notes what an instance may delete.
+    fn collect_deleted(&mut self, instance: &Instance) {
+        let operator = &self.program.operators[instance.operator];
+        let mut environment = instance.objects.clone();
+        let facts = &self.reached.facts;
+        let deleted = &mut self.deleted;
+        let program = self.program;
+        let mut visit = |_: &[Guard<'_>], primitive: Primitive<'_>| match primitive {
+            Primitive::Link(_) | Primitive::Create(..) => {}
+            Primitive::Unlink(link) => {
+                deleted.insert(Atom::Link(link));
+            }
+            Primitive::Retype(object, _) => {
+                let types = facts.types(object).iter();
+                deleted.extend(types.map(|&exact| Atom::Type(object, exact)));
+            }
+            Primitive::Delete(object) => {
+                let types = facts.types(object).iter();
+                deleted.extend(types.map(|&exact| Atom::Type(object, exact)));
+                deleted.extend(facts.links_at(object).into_iter().map(Atom::Link));
+            }
+            Primitive::Assign(place, ..) => {
+                if program.assigned[usize::from(place.attribute())] {
+                    let all = 0..facts.values(place).len();
+                    deleted.extend(all.map(|value| Atom::Value(place, value)));
+                }
+            }
+        };
+        each_primitive(
+            &operator.changes,
+            facts,
+            &mut environment,
+            &mut Vec::new(),
+            &mut visit,
+        );
+    }
+}
+
+/// Any of the parts, or all of them.
+fn combine(parts: Vec<Formula>, any: bool) -> Formula {
+    if any {
+        Formula::any(parts)
+    } else {
+        Formula::all(parts)
+    }
+}
+
+/// The opposite of a formula.
+fn negation(formula: &Formula) -> Formula {
+    match formula {
+        Formula::Literal(literal) => Formula::Literal(if literal.negated() {
+            Literal::positive(literal.fact())
+        } else {
+            Literal::negative(literal.fact())
+        }),
+        Formula::And(parts) => Formula::any(parts.iter().map(negation)),
+        Formula::Or(parts) => Formula::all(parts.iter().map(negation)),
+    }
+}

@@ -1,0 +1,189 @@
+//! From a snapshot, a grammar and a goal to a ground task: rules are matched along links, not tried
+//! on every choice of nodes. This module guarantees that the plans of the task are the plans of the
+//! rules, as long as no rule is applied more often than it has spare objects for what it creates.
+
+mod build;
+mod compile;
+mod effects;
+mod explain;
+mod facts;
+mod join;
+mod program;
+mod reach;
+mod simulate;
+mod truth;
+mod value;
+mod vocabulary;
+mod words;
+mod world;
+
+pub(crate) use build::{Atom, Ground, build};
+pub(crate) use program::{Environment, Object, Operator, UNBOUND, Variable};
+pub(crate) use reach::{Instance, Reached, reach};
+
+use crate::search::{Limits, StopReason};
+use dsr::{ReadError, Snapshot};
+use grammar::{Goal, GoalConstants, Grammar};
+use program::Program;
+use thiserror::Error;
+use words::Words;
+use world::World;
+
+/// Why a goal cannot be looked at.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub(crate) enum ProblemError {
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The goal itself is at fault.
+    #[error("{0}")]
+    Goal(String),
+}
+
+/// A goal, the rules that may lead to it, and the world they start from.
+#[derive(Debug)]
+pub(crate) struct Problem {
+    pub(crate) program: Program,
+    pub(crate) goal: Operator,
+    pub(crate) world: World,
+    /// Names of objects: nodes, then spares.
+    names: Vec<String>,
+    /// Objects for what rules create: by operator, by application, by variable.
+    spares: Vec<Vec<Vec<Object>>>,
+}
+
+impl Problem {
+    /// Reads what the goal and the rules can speak of. Each rule may create nodes `spares` times.
+    pub(crate) fn read(
+        grammar: &Grammar,
+        snapshot: &Snapshot,
+        goal: &Goal,
+        spares: usize,
+    ) -> Result<Self, ProblemError> {
+        let (program, mut wanted) =
+            compile::compile(grammar, goal, snapshot.schema()).map_err(ProblemError::Goal)?;
+        let world = World::read(snapshot, &program, &wanted)?;
+        let constants = match goal.find_constants(snapshot)? {
+            GoalConstants::Found(constants) => constants,
+            GoalConstants::Missing(obstacle) => {
+                return Err(ProblemError::Goal(obstacle.to_string()));
+            }
+        };
+        for (slot, variable) in wanted.variables.iter().enumerate() {
+            let Some(node) = constants.get(&variable.name) else {
+                continue;
+            };
+            let Some(object) = world.object(node) else {
+                let reason = format!("{} is not of the type that the goal says", variable.name);
+                return Err(ProblemError::Goal(reason));
+            };
+            wanted.fixed.push((slot, object));
+        }
+        let mut problem = Self {
+            names: world.names.clone(),
+            spares: Vec::new(),
+            goal: wanted,
+            program,
+            world,
+        };
+        problem.make_spares(spares);
+        Ok(problem)
+    }
+
+    fn make_spares(&mut self, count: usize) {
+        for operator in &self.program.operators {
+            let mut applications = Vec::new();
+            let count = if operator.creates() { count } else { 0 };
+            for application in 1..=count {
+                let mut objects = Vec::new();
+                for variable in &operator.variables[operator.bound..] {
+                    objects.push(self.world.facts.add_object());
+                    let rule = &operator.name;
+                    self.names
+                        .push(format!("{rule}.{}#{application}", variable.name));
+                }
+                applications.push(objects);
+            }
+            self.spares.push(applications);
+        }
+    }
+
+    /// Which operators are not dormant, those of the rules in `woken` counted in.
+    pub(crate) fn awake(&self, woken: &[String]) -> Vec<bool> {
+        let operators = self.program.operators.iter();
+        operators
+            .map(|o| !o.dormant || woken.contains(&o.name))
+            .collect()
+    }
+
+    /// Everything that may come to hold.
+    pub(crate) fn reach(
+        &self,
+        awake: &[bool],
+        limits: &mut Limits<'_>,
+    ) -> Result<Reached, StopReason> {
+        reach(
+            &self.program,
+            &self.goal,
+            &self.world,
+            &self.spares,
+            awake.to_vec(),
+            limits,
+        )
+    }
+
+    /// The name of an object.
+    pub(crate) fn name(&self, object: Object) -> &str {
+        &self.names[object as usize]
+    }
+
+    /// Whether an object stands for a node that a rule is yet to create.
+    pub(crate) fn is_spare(&self, object: Object) -> bool {
+        object as usize >= self.world.nodes.len()
+    }
+
+    pub(crate) fn words(&self) -> Words<'_> {
+        Words {
+            vocabulary: &self.program.vocabulary,
+            names: &self.names,
+        }
+    }
+
+    /// A link of the graph in words; other atoms have none.
+    pub(crate) fn atom(&self, atom: Atom) -> Option<String> {
+        let Atom::Link(link) = atom else {
+            return None;
+        };
+        let label = self.program.vocabulary.labels.name(link.label);
+        Some(format!(
+            "{} -{label}-> {}",
+            self.name(link.from),
+            self.name(link.to)
+        ))
+    }
+
+    /// The operator of a rule.
+    pub(crate) fn operator(&self, rule: &str) -> Option<usize> {
+        let mut operators = self.program.operators.iter();
+        operators.position(|operator| operator.name == rule)
+    }
+
+    /// An operator's environment at a binding of variables to names of nodes.
+    pub(crate) fn environment<'n>(
+        &self,
+        operator: usize,
+        binding: impl IntoIterator<Item = (&'n str, &'n str)>,
+    ) -> Option<Environment> {
+        let operator = &self.program.operators[operator];
+        let mut environment = operator.environment();
+        for (variable, name) in binding {
+            let variables = &operator.variables[..operator.bound];
+            let slot = variables.iter().position(|v| v.name == variable)?;
+            environment[slot] = self.world.object_named(name)?;
+        }
+        let bound = &environment[..operator.bound];
+        (!bound.contains(&UNBOUND)).then_some(environment)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,402 @@
+//! The executive's pure core: takes missions in turn, has plans made, hands out their steps, and
+//! plans anew where the world does not go along. It guarantees that all it goes by stands in the
+//! graph (design.md section 4): an executive that is started anew goes on where the last one was,
+//! and a transaction that got lost or came twice does no harm.
+
+mod adopt;
+pub(crate) mod record;
+mod spec;
+#[cfg(test)]
+mod testing;
+
+pub use record::{MissionStatus, StepStatus};
+pub use spec::{Config, Entry, MissionSpec, Planner, RulePlanner};
+
+use crate::monitor::{Finding, Monitor, Report};
+use adopt::Sought;
+use dsr::{ReadError, Snapshot, Time, Transaction, Value};
+use grammar::{Goal, Grammar, MatchError};
+use record::{Mission, Step};
+use std::collections::BTreeMap;
+
+/// What is remembered besides the graph, of the mission in hand only. Losing it costs a little
+/// time and nothing else.
+#[derive(Debug, Clone, Default)]
+struct Search {
+    mission: String,
+    /// No plan before this.
+    not_before: Option<Time>,
+    /// Since when there has been no plan.
+    fruitless: Option<Time>,
+    /// What made a new plan necessary.
+    why: String,
+}
+
+/// The executive agent without its process.
+#[derive(Debug)]
+pub struct Executive<P> {
+    grammar: Grammar,
+    missions: Vec<MissionSpec>,
+    planner: P,
+    config: Config,
+    monitor: Monitor,
+    goals: BTreeMap<String, Result<Goal, String>>,
+    search: Search,
+    journal: Vec<Entry>,
+}
+
+/// What a mission is looked at with, in one turn.
+#[derive(Clone, Copy)]
+struct Turn<'a> {
+    now: Time,
+    snapshot: &'a Snapshot,
+    goal: &'a Goal,
+}
+
+impl<P: Planner> Executive<P> {
+    /// An executive that looks after `missions` and whatever other missions the graph has.
+    pub fn new(grammar: Grammar, missions: Vec<MissionSpec>, planner: P) -> Self {
+        Self::with_config(grammar, missions, planner, Config::default())
+    }
+
+    /// As [`Self::new`], with other settings.
+    pub fn with_config(
+        grammar: Grammar,
+        missions: Vec<MissionSpec>,
+        planner: P,
+        config: Config,
+    ) -> Self {
+        Self {
+            monitor: Monitor::new(&grammar),
+            grammar,
+            missions,
+            planner,
+            config,
+            goals: BTreeMap::new(),
+            search: Search::default(),
+            journal: Vec::new(),
+        }
+    }
+
+    /// The decisions made since this was last called.
+    pub fn take_journal(&mut self) -> Vec<Entry> {
+        std::mem::take(&mut self.journal)
+    }
+
+    fn log(&mut self, now: Time, what: String, why: impl Into<String>) {
+        self.journal.push(Entry {
+            time: now,
+            what,
+            why: why.into(),
+        });
+    }
+
+    /// One turn: what is to be written, for the store to take in this order. An unchanged world
+    /// gives nothing, except where time itself brings something about.
+    ///
+    /// # Errors
+    /// [`ReadError`]: take a new snapshot; nothing was decided.
+    pub fn step(&mut self, now: Time, snapshot: &Snapshot) -> Result<Vec<Transaction>, ReadError> {
+        let missions = record::missions(snapshot)?;
+        let mut transactions = self.announce(now, snapshot, &missions)?;
+        let Some(mut before) = self.choose(missions) else {
+            return Ok(transactions);
+        };
+        before.steps = record::steps(snapshot, before.id)?;
+        if self.search.mission != before.name {
+            self.search = Search {
+                mission: before.name.clone(),
+                ..Search::default()
+            };
+        }
+        let mut after = before.clone();
+        self.pursue(now, snapshot, &mut after)?;
+        transactions.extend(record::difference(&before, &after, snapshot.version()));
+        Ok(transactions)
+    }
+
+    /// Puts the missions into the graph that it does not have yet.
+    fn announce(
+        &mut self,
+        now: Time,
+        snapshot: &Snapshot,
+        known: &[Mission],
+    ) -> Result<Vec<Transaction>, ReadError> {
+        let mut transactions = Vec::new();
+        for mission in self.missions.clone() {
+            if known.iter().any(|known| known.name == mission.name) {
+                continue;
+            }
+            if snapshot.find_node_by_name(&mission.name)?.is_some() {
+                let what = format!("mission `{}` is left out", mission.name);
+                self.log(now, what, "the graph has another node of that name");
+                self.missions.retain(|other| other.name != mission.name);
+                continue;
+            }
+            let mut transaction = Transaction::new();
+            let attributes = [
+                ("status", MissionStatus::Queued.name().into()),
+                ("goal", mission.goal.as_str().into()),
+                ("priority", Value::I64(mission.priority)),
+                ("replans", Value::U64(0)),
+                ("reason", "".into()),
+            ];
+            let attributes = attributes
+                .map(|(name, value)| (name.to_owned(), value))
+                .to_vec();
+            transaction.create_node("mission", &mission.name, attributes);
+            transactions.push(transaction);
+            self.log(now, format!("mission `{}` is queued", mission.name), "");
+        }
+        Ok(transactions)
+    }
+
+    /// The mission in hand, else the next one.
+    fn choose(&self, missions: Vec<Mission>) -> Option<Mission> {
+        let place = |mission: &Mission| {
+            let listed = self
+                .missions
+                .iter()
+                .position(|spec| spec.name == mission.name);
+            listed.unwrap_or(usize::MAX)
+        };
+        let rank = |mission: &Mission| {
+            let waits = mission.status != MissionStatus::Running;
+            (
+                waits,
+                std::cmp::Reverse(mission.priority),
+                place(mission),
+                mission.id,
+            )
+        };
+        missions
+            .into_iter()
+            .filter(|mission| !mission.status.is_over())
+            .min_by_key(rank)
+    }
+
+    /// Brings a mission on, as a record.
+    fn pursue(
+        &mut self,
+        now: Time,
+        snapshot: &Snapshot,
+        mission: &mut Mission,
+    ) -> Result<(), ReadError> {
+        let goal = match self.goal(&mission.goal) {
+            Ok(goal) => goal,
+            Err(why) => {
+                self.finish(now, mission, MissionStatus::Failed, &why);
+                return Ok(());
+            }
+        };
+        let turn = Turn {
+            now,
+            snapshot,
+            goal: &goal,
+        };
+        match self.grammar.goal_holds(snapshot, &goal) {
+            Ok(None) => {}
+            Ok(Some(_)) => {
+                let open = open(mission);
+                let judged = self
+                    .monitor
+                    .judge(&self.grammar, snapshot, now, &open, &goal)?;
+                self.tick_off(now, mission, judged.over);
+                self.finish(now, mission, MissionStatus::Succeeded, "the goal holds");
+                return Ok(());
+            }
+            Err(MatchError::Read(error)) => return Err(error),
+            Err(other) => {
+                self.finish(now, mission, MissionStatus::Failed, &other.to_string());
+                return Ok(());
+            }
+        }
+        if mission.status == MissionStatus::Queued {
+            mission.status = MissionStatus::Running;
+            self.log(now, format!("mission `{}` begins", mission.name), "");
+        }
+        if let Some(why) = given_up(mission) {
+            return self.replan(turn, mission, &why);
+        }
+        let open = open(mission);
+        if open.is_empty()
+            && mission
+                .steps
+                .last()
+                .is_none_or(|s| s.status == StepStatus::Dropped)
+        {
+            let why = self.search.why.clone();
+            return self.replan(turn, mission, &why);
+        }
+        let Report { over, next } =
+            self.monitor
+                .judge(&self.grammar, snapshot, now, &open, &goal)?;
+        self.tick_off(now, mission, over);
+        match next {
+            Finding::Finished => {
+                let obstacle = self.grammar.goal_obstacle(snapshot, &goal);
+                let obstacle = obstacle
+                    .ok()
+                    .flatten()
+                    .map_or_else(String::new, |o| format!(": {o}"));
+                let why = format!("the plan was carried out and the goal does not hold{obstacle}");
+                self.replan(turn, mission, &why)
+            }
+            Finding::Broken(why) => self.replan(turn, mission, &why),
+            Finding::TimedOut(why) => {
+                if let Some(step) = mission.steps.iter_mut().find(|step| step.status.is_open()) {
+                    step.become_status(StepStatus::Failed, &why, now);
+                    let why = format!("{step} failed: {why}");
+                    return self.replan(turn, mission, &why);
+                }
+                Ok(())
+            }
+            Finding::Sound { dispatch, ahead } => {
+                if let Some(why) = ahead
+                    && self.replace(turn, mission, &why)?
+                {
+                    return Ok(());
+                }
+                if let Some(binding) = dispatch {
+                    self.dispatch(now, mission, binding);
+                }
+                Ok(())
+            }
+        }
+    }
+
+    fn goal(&mut self, text: &str) -> Result<Goal, String> {
+        let types = &self.grammar.types;
+        let read = || {
+            grammar::parse_goal(text, "goal", types)
+                .map_err(|defects| format!("the goal cannot be read: {defects}"))
+        };
+        self.goals
+            .entry(text.to_owned())
+            .or_insert_with(read)
+            .clone()
+    }
+
+    /// Marks the first `over` open steps as done.
+    fn tick_off(&mut self, now: Time, mission: &mut Mission, over: usize) {
+        for step in mission
+            .steps
+            .iter_mut()
+            .filter(|step| step.status.is_open())
+            .take(over)
+        {
+            step.become_status(StepStatus::Done, "its effect holds", now);
+            let what = format!("{step} is done");
+            self.journal.push(Entry {
+                time: now,
+                what,
+                why: step.reason.clone(),
+            });
+        }
+    }
+
+    fn dispatch(&mut self, now: Time, mission: &mut Mission, binding: BTreeMap<String, String>) {
+        if let Some(step) = mission.steps.iter_mut().find(|step| step.status.is_open()) {
+            step.binding = binding;
+            step.become_status(StepStatus::Dispatched, "", now);
+            let what = format!("{step} is dispatched to {}", step.agent);
+            self.log(now, what, "");
+        }
+    }
+
+    /// Ends a mission.
+    fn finish(&mut self, now: Time, mission: &mut Mission, status: MissionStatus, why: &str) {
+        drop_open(now, mission, why, None);
+        mission.status = status;
+        why.clone_into(&mut mission.reason);
+        self.log(
+            now,
+            format!("mission `{}` {}", mission.name, status.name()),
+            why,
+        );
+    }
+
+    /// Plans anew where the plan in force, if there is one, cannot go on.
+    fn replan(&mut self, turn: Turn, mission: &mut Mission, why: &str) -> Result<(), ReadError> {
+        why.clone_into(&mut self.search.why);
+        match self.seek(turn, mission)? {
+            Sought::Plan(steps) => self.adopt(turn.now, mission, steps, why),
+            Sought::Nothing(reason) => {
+                drop_open(turn.now, mission, why, None);
+                let since = *self.search.fruitless.get_or_insert(turn.now);
+                if turn.now.since(since) >= self.config.patience {
+                    self.finish(turn.now, mission, MissionStatus::Failed, &reason);
+                } else if mission.reason != reason {
+                    mission.reason.clone_from(&reason);
+                    self.log(
+                        turn.now,
+                        format!("mission `{}` waits", mission.name),
+                        reason,
+                    );
+                }
+            }
+            Sought::NotNow => drop_open(turn.now, mission, why, None),
+        }
+        Ok(())
+    }
+
+    /// Plans anew where the plan in force will come to nothing; whether there is another. If there
+    /// is none, the step in hand goes on: what is in the way may go before its turn comes.
+    fn replace(&mut self, turn: Turn, mission: &mut Mission, why: &str) -> Result<bool, ReadError> {
+        match self.seek(turn, mission)? {
+            Sought::Plan(steps) => {
+                self.adopt(turn.now, mission, steps, why);
+                Ok(true)
+            }
+            Sought::Nothing(reason) => {
+                let reason = format!("{why}; {reason}");
+                if mission.reason != reason {
+                    mission.reason.clone_from(&reason);
+                    self.log(turn.now, "the step in hand goes on".to_owned(), reason);
+                }
+                Ok(false)
+            }
+            Sought::NotNow => Ok(false),
+        }
+    }
+}
+
+fn open(mission: &Mission) -> Vec<Step> {
+    mission
+        .steps
+        .iter()
+        .filter(|step| step.status.is_open())
+        .cloned()
+        .collect()
+}
+
+/// Why the plan in force is over, if its agent has given up a step of it.
+fn given_up(mission: &Mission) -> Option<String> {
+    let first = mission.steps.iter().position(|step| step.status.is_open());
+    let first = first.unwrap_or(mission.steps.len());
+    if mission
+        .steps
+        .get(first)
+        .is_some_and(|step| step.status.is_under_way())
+    {
+        return None;
+    }
+    let last = mission.steps.get(first.checked_sub(1)?)?;
+    (last.status == StepStatus::Failed).then(|| format!("{last} failed: {}", last.reason))
+}
+
+/// Drops the steps still to be done, but for the one of index `keep`.
+fn drop_open(now: Time, mission: &mut Mission, why: &str, keep: Option<u64>) {
+    for step in mission
+        .steps
+        .iter_mut()
+        .filter(|step| step.status.is_open())
+    {
+        if keep != Some(step.index) {
+            step.become_status(StepStatus::Dropped, why, now);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,107 @@
+//! What the executive is given and what it tells: missions, settings, a planner, its journal. This
+//! file owns the figures that decide how long it waits and how often it tries.
+
+use crate::{Limits, Options, Outcome};
+use dsr::{ReadError, Snapshot, Time};
+use grammar::{Goal, Grammar};
+
+/// What a scenario wants done.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MissionSpec {
+    /// Unique; the name of its node.
+    pub name: String,
+    /// What shall hold, in AGGL (`.aggt`).
+    pub goal: String,
+    /// The larger, the sooner.
+    pub priority: i64,
+}
+
+/// Makes plans.
+pub trait Planner {
+    /// A plan from the snapshot to the goal, or why there is none.
+    ///
+    /// # Errors
+    /// [`ReadError`] where the snapshot cannot be read.
+    fn plan(
+        &self,
+        grammar: &Grammar,
+        snapshot: &Snapshot,
+        goal: &Goal,
+        options: &Options,
+    ) -> Result<Outcome, ReadError>;
+}
+
+/// The planner of this package, [`crate::plan`], held to a number of states, so that planning ends
+/// without a clock and a run can be repeated to the bit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RulePlanner {
+    /// So many states are expanded at the most.
+    pub expansions: u64,
+}
+
+impl Default for RulePlanner {
+    fn default() -> Self {
+        Self { expansions: 20_000 }
+    }
+}
+
+impl Planner for RulePlanner {
+    fn plan(
+        &self,
+        grammar: &Grammar,
+        snapshot: &Snapshot,
+        goal: &Goal,
+        options: &Options,
+    ) -> Result<Outcome, ReadError> {
+        let mut limits = Limits::new().with_expansions(self.expansions);
+        crate::plan(grammar, snapshot, goal, options, &mut limits)
+    }
+}
+
+/// What the executive can be told once, before it starts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Config {
+    /// How to plan; what failed lately is made dearer besides.
+    pub options: Options,
+    /// Without a plan it tries again after this, seconds ...
+    pub retry: f64,
+    /// ... and fails the mission after this, seconds: what perception has not seen by then it does
+    /// not wait for.
+    pub patience: f64,
+    /// Plans follow one another no faster than this, seconds.
+    pub pause: f64,
+    /// What a step that failed costs more, per failure ...
+    pub penalty: f64,
+    /// ... for so long, seconds. Within that time ...
+    pub memory: f64,
+    /// ... a step that failed so often is left out.
+    pub tries: usize,
+    /// So many steps that are over stay in the graph, per mission.
+    pub history: usize,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            options: Options::default(),
+            retry: 1.0,
+            patience: 15.0,
+            pause: 0.5,
+            penalty: 100.0,
+            memory: 600.0,
+            tries: 3,
+            history: 100,
+        }
+    }
+}
+
+/// A decision of the executive.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// When.
+    pub time: Time,
+    /// What it decided.
+    pub what: String,
+    /// Why; empty where that is plain.
+    pub why: String,
+}

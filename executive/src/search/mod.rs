@@ -1,0 +1,147 @@
+//! Searching plans of a ground task: a first one fast, better ones until the limit, or the best.
+//! This module guarantees that what it returns is a plan by [`Task::plan_cost`], and says
+//! *optimal* or *none* only when it is proved.
+
+mod astar;
+mod ff;
+mod greedy;
+mod landmark_cut;
+mod limits;
+mod relaxed;
+mod states;
+
+pub use limits::{Limits, StopReason};
+
+use crate::task::{Literal, Micro, Task};
+use ff::Ff;
+use greedy::Found;
+use landmark_cut::LandmarkCut;
+use relaxed::Relaxed;
+
+/// What is asked of a search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Effort {
+    /// The first plan found.
+    First,
+    /// The first, then better ones until the limit or until the best is proved.
+    #[default]
+    Anytime,
+    /// A plan of least cost, or none.
+    Optimal,
+}
+
+/// What a search came to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Answer {
+    /// A plan.
+    Solved {
+        /// Its actions, by their number in the task.
+        actions: Vec<usize>,
+        /// What it costs.
+        cost: Micro,
+        /// Whether it is proved that none costs less.
+        optimal: bool,
+    },
+    /// It is proved that there is none.
+    Unsolvable,
+    /// None was found within the limit.
+    Stopped(StopReason),
+}
+
+/// What may ever hold, ignoring what actions delete: no plan reaches what is not in here.
+#[derive(Debug, Clone)]
+pub struct Reachability {
+    /// Whether the goal may.
+    pub goal: bool,
+    literals: Vec<bool>,
+}
+
+impl Reachability {
+    /// Of `task`. A literal that no condition of the task names counts as reachable.
+    pub fn new(task: &Task) -> Self {
+        let reachable = Relaxed::new(task).reachable(task);
+        Self {
+            goal: reachable.goal,
+            literals: reachable.literals,
+        }
+    }
+
+    /// Whether a literal may hold.
+    pub fn literal(&self, literal: Literal) -> bool {
+        self.literals[literal.index()]
+    }
+}
+
+/// Searches a plan of `task`.
+///
+/// ```
+/// use executive::task::{Action, Effect, Formula, Literal, Task, micro};
+/// use executive::{Answer, Effort, Limits, search};
+///
+/// let fact = |f| Formula::Literal(Literal::positive(f));
+/// let go = Effect { condition: Formula::TRUE, add: vec![1], delete: vec![0] };
+/// let action = Action::new(fact(0), vec![go], micro(2.0));
+/// let task = Task::new(2, &[0], fact(1), vec![action]);
+/// let answer = search(&task, Effort::Optimal, &mut Limits::new());
+/// assert_eq!(answer, Answer::Solved { actions: vec![0], cost: 2_000_000, optimal: true });
+/// ```
+pub fn search(task: &Task, effort: Effort, limits: &mut Limits<'_>) -> Answer {
+    let relaxed = Relaxed::new(task);
+    if let Err(reason) = limits.check_time() {
+        return Answer::Stopped(reason);
+    }
+    let costs = || task.actions().iter().map(|action| action.cost);
+    if effort == Effort::Optimal {
+        let mut heuristic = LandmarkCut::new(&relaxed, costs().collect());
+        return match astar::search(task, &mut heuristic, limits) {
+            Found::Plan(actions) => solved(task, actions, true),
+            Found::Nothing => Answer::Unsolvable,
+            Found::Stopped(reason) => Answer::Stopped(reason),
+        };
+    }
+    // Every action counts 1 for the first plan: short relaxed plans lead to the goal fastest.
+    let mut unit = Ff::new(task, &relaxed, costs().map(|_| 1).collect());
+    let mut best = match greedy::search(task, &mut unit, None, Micro::MAX, limits) {
+        Found::Plan(actions) => actions,
+        Found::Nothing => return Answer::Unsolvable,
+        Found::Stopped(reason) => return Answer::Stopped(reason),
+    };
+    if effort == Effort::First {
+        return solved(task, best, false);
+    }
+    // One unit is added to each cost, so that free actions do not make a way look short.
+    let mut by_cost = Ff::new(
+        task,
+        &relaxed,
+        costs().map(|c| c.saturating_add(1_000_000)).collect(),
+    );
+    let mut optimal = false;
+    let mut schedule = [None, Some(5), Some(3), Some(2), Some(1)].into_iter();
+    let mut weight = schedule.next().flatten();
+    loop {
+        let bound = task.plan_cost(&best).unwrap_or(Micro::MAX);
+        match greedy::search(task, &mut by_cost, weight, bound, limits) {
+            Found::Plan(better) => best = better,
+            // The search saw every state that a cheaper plan could pass through.
+            Found::Nothing => {
+                optimal = true;
+                break;
+            }
+            Found::Stopped(_) => break,
+        }
+        weight = schedule.next().map_or(weight, |step| step);
+    }
+    solved(task, best, optimal)
+}
+
+fn solved(task: &Task, actions: Vec<usize>, optimal: bool) -> Answer {
+    let cost = task.plan_cost(&actions).unwrap_or(Micro::MAX);
+    Answer::Solved {
+        actions,
+        cost,
+        optimal,
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,230 @@
+//! The matcher against the naive oracle, and against graphs that are written out.
+
+use super::*;
+use crate::testing::oracle::{Assignment, Model, TYPES};
+use crate::testing::random::FEW;
+use crate::testing::repair::repaired;
+use crate::testing::{CARE, care_centre, graph, read, rule};
+use crate::{Defects, has_errors, parse_grammar};
+use dsr::NodeId;
+use proptest::prelude::*;
+use std::collections::BTreeSet;
+
+/// The grammar of one random rule, and the rule.
+fn grammar_of(rule: crate::Rule) -> Grammar {
+    let (mut grammar, _) = parse_grammar(TYPES, "types.aggl");
+    grammar.rules.push(repaired(rule));
+    let (checked, diagnostics) = parse_grammar(&grammar.to_string(), "random.aggl");
+    assert!(
+        !has_errors(&diagnostics),
+        "{grammar}\n{}",
+        Defects { diagnostics }
+    );
+    assert_eq!(checked.rules[0].left, grammar.rules[0].left);
+    checked
+}
+
+fn named(snapshot: &Snapshot, binding: &Binding) -> Assignment {
+    let name = |id| snapshot.find_node(id).unwrap().unwrap().name().unwrap();
+    binding
+        .iter()
+        .map(|(variable, id)| (variable.to_string(), name(id)))
+        .collect()
+}
+
+fn bound(snapshot: &Snapshot, assignment: &Assignment) -> Binding {
+    let id = |name: &str| snapshot.find_node_by_name(name).unwrap().unwrap().id();
+    assignment
+        .iter()
+        .map(|(variable, name)| (variable.as_str(), id(name)))
+        .collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    #[test]
+    fn matches_are_those_of_brute_force(model in Model::strategy(), rule in FEW.rule()) {
+        let grammar = grammar_of(rule);
+        let rule = &grammar.rules[0];
+        let graph = model.to_graph();
+        let snapshot = graph.snapshot();
+        let all = model.assignments(rule);
+        let expected: BTreeSet<Assignment> =
+            all.iter().filter(|at| model.rule_holds(rule, at)).cloned().collect();
+        let found: Vec<Assignment> = grammar
+            .matches(&snapshot, rule, &Binding::new()).unwrap()
+            .map(|binding| named(&snapshot, &binding.unwrap()))
+            .collect();
+        let distinct: BTreeSet<Assignment> = found.iter().cloned().collect();
+        prop_assert_eq!(distinct.len(), found.len(), "a match came twice");
+        prop_assert_eq!(&distinct, &expected, "{}", rule);
+
+        for at in all.iter().take(60).chain(&expected) {
+            let obstacle = grammar.obstacle(&snapshot, rule, &bound(&snapshot, at)).unwrap();
+            prop_assert_eq!(obstacle.is_none(), expected.contains(at), "{:?} {:?}", obstacle, at);
+        }
+    }
+
+    #[test]
+    fn a_partial_binding_keeps_exactly_its_extensions(
+        model in Model::strategy(),
+        rule in FEW.rule(),
+        which in any::<prop::sample::Index>(),
+        node in any::<prop::sample::Index>(),
+    ) {
+        let grammar = grammar_of(rule);
+        let rule = &grammar.rules[0];
+        let variables: Vec<_> = rule.bound_nodes().collect();
+        if variables.is_empty() || model.nodes.is_empty() {
+            return Ok(());
+        }
+        let graph = model.to_graph();
+        let snapshot = graph.snapshot();
+        let variable = &variables[which.index(variables.len())].variable;
+        let name = model.nodes.keys().nth(node.index(model.nodes.len())).unwrap();
+        let id = snapshot.find_node_by_name(name).unwrap().unwrap().id();
+        let partial: Binding = [(variable.clone(), id)].into_iter().collect();
+        let collect = |partial: &Binding| -> BTreeSet<Binding> {
+            grammar.matches(&snapshot, rule, partial).unwrap().map(Result::unwrap).collect()
+        };
+        let expected = collect(&Binding::new());
+        let expected = expected.into_iter().filter(|b| b.get(variable) == Some(id)).collect();
+        prop_assert_eq!(collect(&partial), expected);
+    }
+}
+
+#[test]
+fn connected_rooms_match_although_links_run_both_ways() {
+    let grammar = read(CARE);
+    let centre = care_centre();
+    let snapshot = centre.snapshot();
+    let rule = grammar.rule("changeRoom").unwrap();
+    let found: Vec<_> = grammar
+        .matches(&snapshot, rule, &Binding::new())
+        .unwrap()
+        .map(|binding| named(&snapshot, &binding.unwrap()))
+        .collect();
+    let expected = [("robot", "shelly"), ("room1", "hall"), ("room2", "kitchen")];
+    let expected = expected
+        .map(|(v, n)| (v.to_owned(), n.to_owned()))
+        .into_iter()
+        .collect();
+    assert_eq!(found, [expected]);
+}
+
+#[test]
+fn cost_and_duration_come_from_the_link() {
+    let grammar = read(CARE);
+    let centre = care_centre();
+    let snapshot = centre.snapshot();
+    let rule = grammar.rule("changeRoom").unwrap();
+    let mut matches = grammar.matches(&snapshot, rule, &Binding::new()).unwrap();
+    let binding = matches.next().unwrap().unwrap();
+    assert_eq!(grammar.cost(&snapshot, rule, &binding), Ok(4.5));
+    assert_eq!(grammar.duration(&snapshot, rule, &binding), Ok(Some(9.0)));
+
+    let mut bare = binding.clone();
+    let ward = snapshot.find_node_by_name("ward").unwrap().unwrap().id();
+    bare.insert("room2", ward);
+    let error = grammar.cost(&snapshot, rule, &bare).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "`e(room1, connected, room2).distance` has no value: \
+         e(room1, connected, room2).distance is missing"
+    );
+}
+
+#[test]
+fn obstacles_are_told_in_words() {
+    let grammar = rule(
+        "{ a:box b:box a->b(on) } => { a:box b:box } precondition { (and
+            (forall c:cup (when (not (on c b)) (by c a)))
+            (< a.n 3)
+            (not (by a b))) }",
+    );
+    let tell = |links: &[(&str, &str, &str)], n: f64| {
+        let mut world = graph(&[("box", "x"), ("box", "y"), ("cup", "z")], links);
+        let mut set = dsr::Transaction::new();
+        set.set("x", "n", n);
+        world.commit(&set, "test", dsr::Time::default()).unwrap();
+        let snapshot = world.snapshot();
+        let at = [("a", "x"), ("b", "y")].map(|(v, n)| (v.to_owned(), n.to_owned()));
+        let binding = bound(&snapshot, &at.into_iter().collect());
+        let obstacle = grammar
+            .obstacle(&snapshot, &grammar.rules[0], &binding)
+            .unwrap();
+        obstacle.map_or_else(|| "none".to_owned(), |obstacle| obstacle.to_string())
+    };
+    assert_eq!(tell(&[], 1.0), "a (x) has no link `on` to b (y)");
+    let on = ("x", "on", "y");
+    let by = ("z", "by", "x");
+    assert_eq!(
+        tell(&[on], 1.0),
+        "for c (z): c (z) has no link `by` to a (x), although (not (on c b))"
+    );
+    assert_eq!(tell(&[on, by], 5.0), "(< a.n 3) does not hold: a.n = 5");
+    assert_eq!(
+        tell(&[on, by, ("x", "by", "y")], 1.0),
+        "a (x) has a link `by` to b (y), which must not be"
+    );
+    assert_eq!(tell(&[on, by], 1.0), "none");
+}
+
+#[test]
+fn bindings_are_checked_against_the_rule() {
+    let grammar = read(CARE);
+    let centre = care_centre();
+    let snapshot = centre.snapshot();
+    let rule = grammar.rule("takeTheAttention").unwrap();
+    let id = |name| snapshot.find_node_by_name(name).unwrap().unwrap().id();
+    let tell = |pairs: &[(&str, NodeId)]| {
+        let binding = pairs.iter().copied().collect();
+        grammar
+            .obstacle(&snapshot, rule, &binding)
+            .map(|obstacle| obstacle.unwrap().to_string())
+    };
+    assert_eq!(
+        tell(&[("robot", id("ana")), ("p", id("bob"))]).unwrap(),
+        "robot (ana) is a person, not a robot"
+    );
+    assert_eq!(
+        tell(&[("robot", id("shelly")), ("p", NodeId(99))]).unwrap(),
+        "p (node 99) is not in the graph"
+    );
+    assert_eq!(
+        tell(&[("robto", id("shelly"))]).unwrap_err().to_string(),
+        "rule `takeTheAttention` has no variable `robto` to bind, did you mean `robot`?"
+    );
+}
+
+#[test]
+fn a_large_graph_is_searched_from_its_rarest_part() {
+    // A thousand boxes in a ring, one of them marked: starting anywhere but at the mark would
+    // look at every box, and the second pattern at every pair of them.
+    let names: Vec<String> = (0..1000).map(|index| format!("box{index}")).collect();
+    let mut nodes: Vec<(&str, &str)> = names.iter().map(|name| ("box", name.as_str())).collect();
+    nodes.push(("mark", "mark"));
+    let mut links: Vec<(&str, &str, &str)> = (0..1000)
+        .map(|i| (&*names[i], "next", &*names[(i + 1) % 1000]))
+        .collect();
+    links.push(("mark", "at", "box500"));
+    let ring = graph(&nodes, &links);
+    let snapshot = ring.snapshot();
+    let grammar = rule("{ a:box b:box c:box m:mark a->b(next) b->c(next) m->c(at) } => { }");
+    let mut matches = grammar
+        .matches(&snapshot, &grammar.rules[0], &Binding::new())
+        .unwrap();
+    let found = named(&snapshot, &matches.next().unwrap().unwrap());
+    assert_eq!(
+        (found["a"].as_str(), found["b"].as_str()),
+        ("box498", "box499")
+    );
+    assert!(matches.next().is_none());
+    let debug = format!("{matches:?}");
+    let first = debug
+        .find("source: ")
+        .map(|at| &debug[at..at + 30])
+        .unwrap();
+    assert!(first.starts_with("source: Nodes { slot: 3 }") || first.contains("Edges { link: 2 }"));
+}

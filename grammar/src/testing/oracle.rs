@@ -1,0 +1,516 @@
+//! The meaning of rules written down naively: a graph of maps, every assignment tried, every
+//! formula evaluated as the language reference reads. Slow, and independent of the matcher.
+
+use crate::{
+    Arithmetic, AttributePath, Comparison, Condition, Effect, Expression, Literal, Pattern,
+    PatternNode, Rule,
+};
+use dsr::{Graph, Schema, Time, Transaction, Value};
+use proptest::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What the schema and the grammar's types block say together: each type's parents.
+const PARENTS: [(&str, &[&str]); 7] = [
+    ("thing", &[]),
+    ("box", &["thing", "gear"]),
+    ("cup", &["thing", "box"]),
+    ("mug", &["cup"]),
+    ("tool", &["gear"]),
+    ("pot", &["box", "tool"]),
+    ("gear", &[]),
+];
+/// All but `gear`, which only the grammar knows.
+const NODE_TYPES: [&str; 6] = ["thing", "box", "cup", "mug", "tool", "pot"];
+/// Of these, what the types block adds to the schema.
+pub(crate) const TYPES: &str = "name=t\n===\ntypes {\n(thing gear)\n(cup : box)\n(mug : cup)\n\
+                                (box : thing gear)\n(tool : gear)\n(pot : tool)\n}\n===\n";
+const SCHEMA: &str = "open = true\n[types]\nthing = []\nbox = [\"thing\"]\ncup = [\"thing\"]\n\
+                      mug = []\ntool = []\npot = [\"box\", \"tool\"]\n";
+/// Subtypes by the schema alone.
+const SCHEMA_SUBTYPES: [(&str, &[&str]); 3] = [
+    ("thing", &["box", "cup", "pot"]),
+    ("box", &["pot"]),
+    ("tool", &["pot"]),
+];
+
+type LinkKey = (String, String, String);
+/// Variables and the names of their nodes.
+pub(crate) type Assignment = BTreeMap<String, String>;
+
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Model {
+    pub(crate) nodes: BTreeMap<String, String>,
+    links: BTreeSet<LinkKey>,
+    /// Attributes of nodes.
+    values: BTreeMap<(String, String), f64>,
+    link_values: BTreeMap<(LinkKey, String), f64>,
+}
+
+fn is_a(type_name: &str, general: &str) -> bool {
+    type_name == general
+        || PARENTS
+            .iter()
+            .filter(|(name, _)| *name == type_name)
+            .flat_map(|(_, parents)| *parents)
+            .any(|parent| is_a(parent, general))
+}
+
+impl Model {
+    pub(crate) fn strategy() -> impl Strategy<Value = Self> {
+        let types = prop::collection::vec(0..NODE_TYPES.len(), 0..6);
+        let ends = || (0..6_usize, 0..2_usize, 0..6_usize);
+        let links = prop::collection::vec((ends(), prop::option::of(-2..5_i32)), 0..14);
+        let values = prop::collection::vec((0..6_usize, 0..2_usize, -2..5_i32), 0..8);
+        (types, links, values).prop_map(|(types, links, values)| {
+            let mut model = Self::default();
+            let node = |index: usize| format!("node{index}");
+            for (index, type_index) in types.iter().enumerate() {
+                model
+                    .nodes
+                    .insert(node(index), NODE_TYPES[*type_index].to_owned());
+            }
+            for ((from, label, to), value) in links {
+                let label = ["on", "by"][label].to_owned();
+                if from < types.len() && to < types.len() {
+                    let key = (node(from), label, node(to));
+                    if let Some(value) = value {
+                        model
+                            .link_values
+                            .insert((key.clone(), "n".into()), value.into());
+                    }
+                    model.links.insert(key);
+                }
+            }
+            for (index, attribute, value) in values {
+                if index < types.len() {
+                    let attribute = ["n", "m"][attribute].to_owned();
+                    model.values.insert((node(index), attribute), value.into());
+                }
+            }
+            model
+        })
+    }
+
+    pub(crate) fn to_graph(&self) -> Graph {
+        let mut graph = Graph::in_memory(Schema::from_toml("schema", SCHEMA).unwrap());
+        let mut transaction = Transaction::new();
+        for (name, type_name) in &self.nodes {
+            transaction.create_node(type_name, name, vec![]);
+        }
+        for (from, label, to) in &self.links {
+            transaction.create_edge(from.as_str(), label, to.as_str());
+        }
+        for ((node, attribute), value) in &self.values {
+            transaction.set(node.as_str(), attribute, *value as i64);
+        }
+        for (((from, label, to), attribute), value) in &self.link_values {
+            let edge = dsr::EdgeRef::new(from.as_str(), label, to.as_str());
+            transaction.set_on_edge(edge, attribute, *value as i64);
+        }
+        graph.commit(&transaction, "test", Time::default()).unwrap();
+        graph
+    }
+
+    pub(crate) fn of_graph(graph: &Graph) -> Self {
+        let snapshot = graph.snapshot();
+        let schema = snapshot.schema();
+        let number = |value: Value| value.as_f64().unwrap();
+        let name = |id| snapshot.find_node(id).unwrap().unwrap().name().unwrap();
+        let mut model = Self::default();
+        for node in snapshot.nodes() {
+            let node = node.unwrap();
+            let this = node.name().unwrap();
+            for attribute in node.attributes().unwrap() {
+                let key = schema.attribute_name(attribute.name).to_owned();
+                model
+                    .values
+                    .insert((this.clone(), key), number(attribute.value));
+            }
+            for key in node.out_edges() {
+                let key = key.unwrap();
+                let link = (
+                    this.clone(),
+                    schema.label_name(key.label).to_owned(),
+                    name(key.to),
+                );
+                for attribute in snapshot
+                    .find_edge(key)
+                    .unwrap()
+                    .unwrap()
+                    .attributes()
+                    .unwrap()
+                {
+                    let key = schema.attribute_name(attribute.name).to_owned();
+                    model
+                        .link_values
+                        .insert((link.clone(), key), number(attribute.value));
+                }
+                model.links.insert(link);
+            }
+            model.nodes.insert(this, node.type_name().to_owned());
+        }
+        model
+    }
+
+    fn of_type(&self, type_name: &str) -> Vec<String> {
+        let nodes = self.nodes.iter().filter(|(_, of)| is_a(of, type_name));
+        nodes.map(|(name, _)| name.clone()).collect()
+    }
+
+    fn has(&self, from: &str, label: &str, to: &str) -> bool {
+        self.links.contains(&(from.into(), label.into(), to.into()))
+    }
+
+    /// Every assignment of nodes to the rule's variables, matching or not.
+    pub(crate) fn assignments(&self, rule: &Rule) -> Vec<Assignment> {
+        let mut all = vec![Assignment::new()];
+        for node in rule.bound_nodes() {
+            let extended = all.iter().flat_map(|assignment| {
+                self.nodes.keys().map(|name| {
+                    let mut assignment = assignment.clone();
+                    assignment.insert(node.variable.to_string(), name.clone());
+                    assignment
+                })
+            });
+            all = extended.collect();
+        }
+        all
+    }
+
+    pub(crate) fn rule_holds(&self, rule: &Rule, at: &Assignment) -> bool {
+        let distinct: BTreeSet<&String> = at.values().collect();
+        let typed = |nodes: &[PatternNode]| {
+            nodes
+                .iter()
+                .all(|node| is_a(&self.nodes[&at[&*node.variable]], &node.type_name))
+        };
+        distinct.len() == at.len()
+            && typed(&rule.left.nodes)
+            && typed(&rule.parameters)
+            && self.links_hold(&rule.left, at)
+            && rule
+                .precondition
+                .as_ref()
+                .is_none_or(|condition| self.holds(condition, at))
+    }
+
+    fn links_hold(&self, pattern: &Pattern, at: &Assignment) -> bool {
+        pattern
+            .edges
+            .iter()
+            .all(|edge| self.has(&at[&*edge.from], &edge.label, &at[&*edge.to]) != edge.negated)
+    }
+
+    fn choices(&self, variables: &[PatternNode], at: &Assignment) -> Vec<Assignment> {
+        let mut all = vec![at.clone()];
+        for variable in variables {
+            let extended = all.iter().flat_map(|assignment| {
+                self.of_type(&variable.type_name).into_iter().map(|name| {
+                    let mut assignment = assignment.clone();
+                    assignment.insert(variable.variable.to_string(), name);
+                    assignment
+                })
+            });
+            all = extended.collect();
+        }
+        all
+    }
+
+    fn holds(&self, condition: &Condition, at: &Assignment) -> bool {
+        match condition {
+            Condition::Edge { label, from, to } => self.has(&at[&**from], label, &at[&**to]),
+            Condition::Same(a, b) => at[&**a] == at[&**b],
+            Condition::Compare {
+                operator,
+                left,
+                right,
+            } => {
+                let (Some(left), Some(right)) = (self.value(left, at), self.value(right, at))
+                else {
+                    return false;
+                };
+                match operator {
+                    Comparison::Equal => left == right,
+                    Comparison::NotEqual => left != right,
+                    Comparison::Less => left < right,
+                    Comparison::LessOrEqual => left <= right,
+                    Comparison::Greater => left > right,
+                    Comparison::GreaterOrEqual => left >= right,
+                }
+            }
+            Condition::Not(inner) => !self.holds(inner, at),
+            Condition::And(all) => all.iter().all(|inner| self.holds(inner, at)),
+            Condition::Or(any) => any.iter().any(|inner| self.holds(inner, at)),
+            Condition::Exists { variables, body } => self
+                .choices(variables, at)
+                .iter()
+                .any(|choice| self.holds(body, choice)),
+            Condition::Forall { variables, body } => self
+                .choices(variables, at)
+                .iter()
+                .all(|choice| self.holds(body, choice)),
+            Condition::When {
+                condition,
+                consequence,
+            } => !self.holds(condition, at) || self.holds(consequence, at),
+        }
+    }
+
+    fn value(&self, expression: &Expression, at: &Assignment) -> Option<f64> {
+        match expression {
+            Expression::Literal(Literal::Integer(value)) => Some(*value as f64),
+            Expression::Literal(_) => unreachable!("few words have whole numbers only"),
+            Expression::Attribute(AttributePath::Node {
+                variable,
+                attribute,
+            }) => self
+                .values
+                .get(&(at[&**variable].clone(), attribute.to_string()))
+                .copied(),
+            Expression::Attribute(AttributePath::Edge {
+                from,
+                label,
+                to,
+                attribute,
+            }) => {
+                let link = (at[&**from].clone(), label.to_string(), at[&**to].clone());
+                self.link_values
+                    .get(&(link, attribute.to_string()))
+                    .copied()
+            }
+            Expression::Arithmetic { operator, operands } => {
+                let values: Option<Vec<f64>> = operands
+                    .iter()
+                    .map(|operand| self.value(operand, at))
+                    .collect();
+                match (&values?[..], operator) {
+                    ([only], _) => Some(-only),
+                    (all, Arithmetic::Add) => Some(all.iter().sum()),
+                    (all, Arithmetic::Multiply) => Some(all.iter().product()),
+                    ([first, rest @ ..], Arithmetic::Subtract) => {
+                        Some(first - rest.iter().sum::<f64>())
+                    }
+                    ([first, rest @ ..], Arithmetic::Divide) => rest
+                        .iter()
+                        .try_fold(*first, |sum, next| (*next != 0.0).then(|| sum / next)),
+                    ([], _) => None,
+                }
+            }
+        }
+    }
+
+    /// The graph after the rule at a match, or `None` where it must be refused.
+    pub(crate) fn applied(&self, rule: &Rule, at: &Assignment) -> Option<Self> {
+        let mut plan = Plan::default();
+        let mut at = at.clone();
+        for node in &rule.right.nodes {
+            match rule
+                .bound_nodes()
+                .find(|left| left.variable == node.variable)
+            {
+                Some(left) if left.type_name == node.type_name => {}
+                Some(_) => {
+                    set(
+                        &mut plan.retyped,
+                        at[&*node.variable].clone(),
+                        node.type_name.to_string(),
+                    )?;
+                }
+                None => {
+                    let name = plan.create(self, &node.type_name);
+                    at.insert(node.variable.to_string(), name);
+                }
+            }
+        }
+        for node in &rule.left.nodes {
+            if rule.right.node(&node.variable).is_none() {
+                plan.deleted.insert(at[&*node.variable].clone());
+            }
+        }
+        let key = |from: &str, label: &str, to: &str| {
+            (at[from].clone(), label.to_owned(), at[to].clone())
+        };
+        for edge in rule.left.edges.iter().filter(|edge| !edge.negated) {
+            plan.unwanted.insert(key(&edge.from, &edge.label, &edge.to));
+        }
+        for edge in &rule.right.edges {
+            let side = if edge.negated {
+                &mut plan.unwanted
+            } else {
+                &mut plan.wanted
+            };
+            side.insert(key(&edge.from, &edge.label, &edge.to));
+        }
+        self.effects(&rule.effect, &at, &mut plan)?;
+        let touches = |link: &LinkKey, node: &String| link.0 == *node || link.2 == *node;
+        let hangs = |node: &String| {
+            self.links
+                .iter()
+                .any(|link| touches(link, node) && !plan.unlinked(rule, &at, link))
+        };
+        let dangling = plan.deleted.iter().any(hangs);
+        (!(rule.strict && dangling)).then(|| self.after(&plan))
+    }
+
+    fn effects(&self, effects: &[Effect], at: &Assignment, plan: &mut Plan) -> Option<()> {
+        let mut at = at.clone();
+        for effect in effects {
+            match effect {
+                Effect::Link { label, from, to } => {
+                    let key = (at[&**from].clone(), label.to_string(), at[&**to].clone());
+                    plan.wanted.insert(key);
+                }
+                Effect::Unlink { label, from, to } => {
+                    let key = (at[&**from].clone(), label.to_string(), at[&**to].clone());
+                    plan.unwanted.insert(key.clone());
+                    plan.said.insert(key);
+                }
+                Effect::Assign { target, value } => {
+                    let value = self.value(value, &at)?;
+                    match target {
+                        AttributePath::Node {
+                            variable,
+                            attribute,
+                        } => {
+                            let key = (at[&**variable].clone(), attribute.to_string());
+                            set(&mut plan.assigned, key, value)?;
+                        }
+                        AttributePath::Edge {
+                            from,
+                            label,
+                            to,
+                            attribute,
+                        } => {
+                            let link = (at[&**from].clone(), label.to_string(), at[&**to].clone());
+                            set(
+                                &mut plan.link_assigned,
+                                (link, attribute.to_string()),
+                                value,
+                            )?;
+                        }
+                    }
+                }
+                Effect::Create {
+                    variable,
+                    type_name,
+                } => {
+                    let name = plan.create(self, type_name);
+                    at.insert(variable.to_string(), name);
+                }
+                Effect::Delete { variable } => {
+                    plan.deleted.insert(at[&**variable].clone());
+                }
+                Effect::Retype {
+                    variable,
+                    type_name,
+                } => {
+                    set(
+                        &mut plan.retyped,
+                        at[&**variable].clone(),
+                        type_name.to_string(),
+                    )?;
+                }
+                Effect::Forall { variables, body } => {
+                    for choice in self.choices(variables, &at) {
+                        self.effects(body, &choice, plan)?;
+                    }
+                }
+                Effect::When { condition, body } => {
+                    if self.holds(condition, &at) {
+                        self.effects(body, &at, plan)?;
+                    }
+                }
+            }
+        }
+        Some(())
+    }
+
+    fn after(&self, plan: &Plan) -> Self {
+        let mut model = self.clone();
+        model
+            .links
+            .retain(|link| !plan.unwanted.contains(link) || plan.wanted.contains(link));
+        model.links.extend(plan.wanted.iter().cloned());
+        model.nodes.extend(plan.created.iter().cloned());
+        for (node, type_name) in &plan.retyped {
+            model.nodes.insert(node.clone(), type_name.clone());
+        }
+        for (key, value) in &plan.assigned {
+            model.values.insert(key.clone(), *value);
+        }
+        for (key, value) in &plan.link_assigned {
+            model.link_values.insert(key.clone(), *value);
+        }
+        for node in &plan.deleted {
+            model.nodes.remove(node);
+        }
+        let Self {
+            nodes,
+            links,
+            values,
+            link_values,
+        } = &mut model;
+        links.retain(|(from, _, to)| nodes.contains_key(from) && nodes.contains_key(to));
+        values.retain(|(node, _), _| nodes.contains_key(node));
+        link_values.retain(|(link, _), _| links.contains(link));
+        model
+    }
+}
+
+/// Sets what may be set once, or again to the same.
+fn set<K: Ord, V: PartialEq>(map: &mut BTreeMap<K, V>, key: K, value: V) -> Option<()> {
+    match map.get(&key) {
+        Some(before) => (*before == value).then_some(()),
+        None => map.insert(key, value).is_none().then_some(()),
+    }
+}
+
+#[derive(Debug, Default)]
+struct Plan {
+    created: Vec<(String, String)>,
+    deleted: BTreeSet<String>,
+    retyped: BTreeMap<String, String>,
+    wanted: BTreeSet<LinkKey>,
+    unwanted: BTreeSet<LinkKey>,
+    /// Links that effects unlink by name.
+    said: BTreeSet<LinkKey>,
+    assigned: BTreeMap<(String, String), f64>,
+    link_assigned: BTreeMap<(LinkKey, String), f64>,
+}
+
+impl Plan {
+    /// A node named after its type, by the first free number after the count of its kind.
+    fn create(&mut self, model: &Model, type_name: &str) -> String {
+        let subtypes = SCHEMA_SUBTYPES
+            .iter()
+            .find(|(general, _)| *general == type_name);
+        let counted = |of: &String| {
+            of == type_name || subtypes.is_some_and(|(_, special)| special.contains(&of.as_str()))
+        };
+        let first = model.nodes.values().filter(|of| counted(of)).count() + 1;
+        let taken = |name: &String| {
+            model.nodes.contains_key(name) || self.created.iter().any(|(other, _)| other == name)
+        };
+        let name = (first..)
+            .map(|n| format!("{type_name}_{n}"))
+            .find(|name| !taken(name))
+            .unwrap();
+        self.created.push((name.clone(), type_name.to_owned()));
+        name
+    }
+
+    /// Whether the rule itself, and not the deletion of a node, takes the link away.
+    fn unlinked(&self, rule: &Rule, at: &Assignment, link: &LinkKey) -> bool {
+        let is = |edge: &crate::PatternEdge| {
+            at[&*edge.from] == link.0 && *edge.label == *link.1 && at[&*edge.to] == link.2
+        };
+        let kept = rule
+            .right
+            .edges
+            .iter()
+            .any(|edge| !edge.negated && is(edge));
+        let on_left = rule.left.edges.iter().any(|edge| !edge.negated && is(edge));
+        let starred = rule.right.edges.iter().any(|edge| edge.negated && is(edge));
+        (on_left && !kept) || starred || self.said.contains(link)
+    }
+}

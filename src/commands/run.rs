@@ -1,0 +1,187 @@
+//! `cortex run`: a scenario from start to report.
+
+use super::output;
+use crate::cli::Run as Arguments;
+use crate::conduct::{MissionState, Recording, Settings, StepState, conduct};
+use crate::progress::Progress;
+use crate::{Answer, Failure};
+use agents::social_mapping::config::SocialConfig;
+use scenarios::metrics::{Metrics, ObjectSpace, measure, object_spaces};
+use scenarios::picture::{Picture, Run, png};
+use scenarios::report::{
+    AgentReport, Baseline, FORMAT, MissionOutcome, MissionReport, Report, StepReport,
+};
+use scenarios::{Scenario, Tracks};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+/// Pixels of map.png for each of map.svg.
+const SCALE: f32 = 2.0;
+
+/// What all runs of one command have in common.
+struct Plan<'a> {
+    arguments: &'a Arguments,
+    scenario: &'a Scenario,
+    folder: PathBuf,
+    interrupted: &'a AtomicBool,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
+    // Everything that can be wrong with the input is told before a process is started.
+    let scenario = super::load_scenario(&arguments.scenario)?;
+    let (_, grammar) = super::load_rules(&scenario)?;
+    super::check_goals(&scenario, &grammar)?;
+    if let Some(tracks) = &arguments.tracks {
+        Tracks::load(tracks).map_err(|error| Failure::Input(error.into()))?;
+    }
+    let spaces = object_spaces(&scenario, &SocialConfig::default()).map_err(Failure::input)?;
+    let folder = arguments.report.clone().unwrap_or_else(|| Path::new("reports").join(&scenario.name));
+    let interrupted = super::interruption()?;
+    let plan = Plan { arguments, scenario: &scenario, folder, interrupted: &interrupted };
+    let social = !arguments.no_social;
+    let Some(recording) = plan.conduct(social, false)? else { return Ok(Answer::No) };
+    let baseline = if social && !arguments.no_baseline {
+        let Some(baseline) = plan.conduct(false, true)? else { return Ok(Answer::No) };
+        Some(baseline)
+    } else {
+        None
+    };
+    plan.report(&recording, baseline.as_ref(), &spaces)?;
+    Ok(if recording.succeeded() { Answer::Yes } else { Answer::No })
+}
+
+impl Plan<'_> {
+    /// One run; `None` where the user interrupted it. The comparison without social behaviour goes
+    /// in lockstep: it costs seconds, and what it shows does not hang on how busy the machine is.
+    fn conduct(&self, social: bool, baseline: bool) -> Result<Option<Recording>, Failure> {
+        let arguments = self.arguments;
+        let name = &arguments.instance.instance;
+        let (instance, logs, title) = if baseline {
+            let title = format!("{} without social behaviour", self.scenario.name);
+            (super::instance(&format!("{name}-baseline"))?, "logs-baseline", title)
+        } else {
+            (super::instance(name)?, "logs", self.scenario.name.clone())
+        };
+        let logs = self.folder.join(logs);
+        fresh_folder(&logs)?;
+        let settings = Settings {
+            instance,
+            scenario: self.scenario,
+            social,
+            seed: arguments.seed,
+            speed: arguments.speed,
+            lockstep: arguments.lockstep || baseline,
+            tracks: arguments.tracks.as_deref(),
+            logs,
+        };
+        let mut progress = Progress::new(&title, arguments.json);
+        let recording = conduct(&settings, self.interrupted, &mut progress);
+        let recording = recording.map_err(Failure::internal)?;
+        if recording.is_none() {
+            progress.say("interrupted: every process has ended, nothing is reported");
+        }
+        Ok(recording)
+    }
+
+    fn report(
+        &self,
+        recording: &Recording,
+        baseline: Option<&Recording>,
+        spaces: &[ObjectSpace],
+    ) -> Result<(), Failure> {
+        let arguments = self.arguments;
+        let radius = self.scenario.robot.radius;
+        let measured = |recording: &Recording| measure(&recording.truths, radius, spaces);
+        let metrics = measured(recording);
+        let other = baseline.map(|other| (other, measured(other)));
+        let picture = self.picture(recording, &metrics, other.as_ref(), spaces);
+        let mission = MissionReport::of(recording.missions.iter().map(mission).collect());
+        let report = Report {
+            format: FORMAT,
+            scenario: self.scenario.name.clone(),
+            seed: arguments.seed,
+            social: !arguments.no_social,
+            success: recording.succeeded(),
+            mission,
+            metrics,
+            plan: recording.steps.iter().filter_map(step).collect(),
+            replans: recording.missions.iter().map(|mission| mission.replans).sum(),
+            agents: recording
+                .accounts
+                .iter()
+                .map(|account| AgentReport {
+                    name: account.name.clone(),
+                    restarts: account.restarts,
+                    cpu_seconds: (!arguments.lockstep).then_some(account.cpu_seconds),
+                })
+                .collect(),
+            baseline: other
+                .map(|(other, metrics)| Baseline { success: other.succeeded(), metrics }),
+        };
+        let json = report.to_json().map_err(Failure::internal)?;
+        write(&self.folder.join("report.json"), json.as_bytes())?;
+        write(&self.folder.join("map.svg"), picture.as_bytes())?;
+        let pixels = png(&picture, SCALE).map_err(Failure::internal)?;
+        write(&self.folder.join("map.png"), &pixels)?;
+        if arguments.json {
+            return output::print(&json);
+        }
+        let folder = self.folder.display();
+        output::print(&format!("{}\nreport.json, map.svg and map.png are in {folder}\n", report.table()))
+    }
+
+    fn picture(
+        &self,
+        recording: &Recording,
+        metrics: &Metrics,
+        baseline: Option<&(&Recording, Metrics)>,
+        spaces: &[ObjectSpace],
+    ) -> String {
+        let social = !self.arguments.no_social;
+        let baseline = baseline.map(|(other, metrics)| Run {
+            social: false,
+            success: other.succeeded(),
+            samples: &other.truths,
+            metrics,
+        });
+        let success = recording.succeeded();
+        let run = Run { social, success, samples: &recording.truths, metrics };
+        let seed = self.arguments.seed;
+        Picture { scenario: self.scenario, spaces, seed, run, baseline, at: None }.svg()
+    }
+}
+
+fn mission(state: &MissionState) -> MissionOutcome {
+    let reason = (!state.reason.is_empty()).then(|| state.reason.clone());
+    MissionOutcome {
+        name: state.name.clone(),
+        goal: state.goal.clone(),
+        status: state.status.clone(),
+        reason,
+    }
+}
+
+/// A step as the report has it; those of plans that were given up before they began are left out.
+fn step(state: &StepState) -> Option<StepReport> {
+    (state.status != "dropped").then(|| StepReport {
+        rule: state.rule.clone(),
+        binding: serde_json::from_str(&state.binding).unwrap_or_default(),
+        status: state.status.clone(),
+    })
+}
+
+/// Makes a folder, and takes out what an earlier run left in it.
+fn fresh_folder(folder: &Path) -> Result<(), Failure> {
+    let failed = |error| Failure::input(format!("cannot write to {}: {error}", folder.display()));
+    if let Err(error) = std::fs::remove_dir_all(folder)
+        && error.kind() != std::io::ErrorKind::NotFound
+    {
+        return Err(failed(error));
+    }
+    std::fs::create_dir_all(folder).map_err(failed)
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    std::fs::write(path, bytes)
+        .map_err(|error| Failure::input(format!("cannot write {}: {error}", path.display())))
+}

@@ -1,0 +1,404 @@
+//! One run of a scenario: starts its processes, follows it to the missions' end, and keeps what a
+//! report is made of. It guarantees that whatever happens, every process has ended and nothing of
+//! the instance is left when it returns.
+
+use crate::progress::Progress;
+use crate::supervise::{Hold, Notice, Policy, Program, SuperviseError, Supervisor};
+use dsr::{Image, Instance, ReadError, Session, Snapshot, Subscriber, Tick, Value};
+use scenarios::process::{TICK, TRUTH, tick_time};
+use scenarios::{Scenario, Truth};
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+use thiserror::Error;
+
+/// How long the store may take to show its graph.
+const PATIENCE: Duration = Duration::from_secs(20);
+/// How often a free run looks at its processes.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// What to run, and how.
+#[derive(Debug, Clone)]
+pub(crate) struct Settings<'a> {
+    pub(crate) instance: Instance,
+    pub(crate) scenario: &'a Scenario,
+    pub(crate) social: bool,
+    pub(crate) seed: u64,
+    pub(crate) speed: f64,
+    pub(crate) lockstep: bool,
+    pub(crate) tracks: Option<&'a Path>,
+    pub(crate) logs: PathBuf,
+}
+
+/// Why a run could not be brought to its end.
+#[derive(Debug, Error)]
+pub(crate) enum ConductError {
+    #[error(transparent)]
+    Supervise(#[from] SuperviseError),
+    #[error(transparent)]
+    Attach(#[from] dsr::AttachError),
+    #[error(transparent)]
+    Instance(#[from] dsr::InstanceError),
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    #[error("{0}")]
+    Hold(String),
+}
+
+/// A mission as the graph told of it at last.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct MissionState {
+    pub(crate) name: String,
+    pub(crate) goal: String,
+    pub(crate) status: String,
+    pub(crate) reason: String,
+    pub(crate) replans: u64,
+}
+
+/// A step of a plan as the graph told of it at last.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct StepState {
+    pub(crate) mission: String,
+    pub(crate) rule: String,
+    pub(crate) binding: String,
+    pub(crate) status: String,
+}
+
+/// What became of one process.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Account {
+    pub(crate) name: String,
+    pub(crate) restarts: u64,
+    pub(crate) cpu_seconds: f64,
+}
+
+/// What a run left to report.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Recording {
+    pub(crate) truths: Vec<Truth>,
+    pub(crate) missions: Vec<MissionState>,
+    pub(crate) steps: Vec<StepState>,
+    pub(crate) accounts: Vec<Account>,
+}
+
+impl Recording {
+    /// Whether every mission has succeeded.
+    pub(crate) fn succeeded(&self) -> bool {
+        !self.missions.is_empty() && self.missions.iter().all(|m| m.status == "succeeded")
+    }
+}
+
+struct Conductor<'a> {
+    settings: &'a Settings<'a>,
+    // Dropped in this order: processes first, then what they share.
+    supervisor: Supervisor,
+    truth: Subscriber<Truth>,
+    session: Session,
+    _hold: Hold,
+    store: usize,
+    agents: Vec<usize>,
+    world: usize,
+    recording: Recording,
+    interrupted: &'a AtomicBool,
+    progress: &'a mut Progress,
+}
+
+/// Runs the scenario to its end. `None` where the user interrupted it.
+pub(crate) fn conduct(
+    settings: &Settings<'_>,
+    interrupted: &AtomicBool,
+    progress: &mut Progress,
+) -> Result<Option<Recording>, ConductError> {
+    match run(settings, interrupted, progress) {
+        Err(ConductError::Supervise(SuperviseError::Interrupted)) => Ok(None),
+        other => other,
+    }
+}
+
+fn run(
+    settings: &Settings<'_>,
+    interrupted: &AtomicBool,
+    progress: &mut Progress,
+) -> Result<Option<Recording>, ConductError> {
+    let mut conductor = Conductor::start(settings, interrupted, progress)?;
+    let ended = if settings.lockstep { conductor.in_lockstep()? } else { conductor.free()? };
+    Ok(ended.then(|| conductor.finish()).transpose()?)
+}
+
+/// The store's rescue: saves the graph as this process still sees it, for the next store.
+fn rescue(session: &mut Session) -> Result<Vec<OsString>, String> {
+    let snapshot = session.snapshot().map_err(|error| error.to_string())?;
+    let image = Image::of(&snapshot).map_err(|error| error.to_string())?;
+    let path = session.instance().folder().join("graph.image");
+    std::fs::write(&path, image.to_bytes()).map_err(|error| format!("{}: {error}", path.display()))?;
+    Ok(vec!["--restore".into(), path.into()])
+}
+
+impl<'a> Conductor<'a> {
+    fn start(
+        settings: &'a Settings<'a>,
+        interrupted: &'a AtomicBool,
+        progress: &'a mut Progress,
+    ) -> Result<Self, ConductError> {
+        let hold = Hold::take(&settings.instance)
+            .map_err(|report| ConductError::Hold(format!("{report}")))?;
+        let executable = std::env::current_exe().map_err(|source| {
+            SuperviseError::Start { process: "cortex".to_owned(), source }
+        })?;
+        let session = Session::join(&settings.instance, "supervisor")?;
+        let truth = session.subscriber(TRUTH)?;
+        let mut conductor = Self {
+            settings,
+            supervisor: Supervisor::new(executable, &settings.logs),
+            truth,
+            session,
+            _hold: hold,
+            store: 0,
+            agents: Vec::new(),
+            world: 0,
+            recording: Recording::default(),
+            interrupted,
+            progress,
+        };
+        conductor.progress.say("starting the store");
+        conductor.store = conductor.supervisor.start(conductor.store_program())?;
+        conductor.until_ready(conductor.store)?;
+        conductor.session.wait_for_store(PATIENCE)?;
+        conductor.progress.say("starting the agents");
+        for name in crate::commands::AGENTS {
+            let program = conductor.agent_program(name, Policy::Restart);
+            let index = conductor.supervisor.start(program)?;
+            conductor.agents.push(index);
+        }
+        for index in conductor.agents.clone() {
+            conductor.until_ready(index)?;
+        }
+        let world = conductor.agent_program("world", Policy::EndRun);
+        conductor.world = conductor.supervisor.start(world)?;
+        conductor.until_ready(conductor.world)?;
+        Ok(conductor)
+    }
+
+    fn store_program(&self) -> Program {
+        let settings = self.settings;
+        let mut arguments: Vec<OsString> = vec!["store".into(), "--supervised".into()];
+        arguments.extend(["--scenario".into(), settings.scenario.folder.clone().into()]);
+        arguments.extend(["--instance".into(), settings.instance.name().into()]);
+        if !settings.social {
+            arguments.push("--no-social".into());
+        }
+        Program { name: "store".to_owned(), arguments, policy: Policy::RestartWithGraph }
+    }
+
+    fn agent_program(&self, name: &str, policy: Policy) -> Program {
+        let settings = self.settings;
+        let mut arguments: Vec<OsString> = vec!["agent".into(), name.into(), "--supervised".into()];
+        arguments.extend(["--scenario".into(), settings.scenario.folder.clone().into()]);
+        arguments.extend(["--instance".into(), settings.instance.name().into()]);
+        if name == "world" {
+            arguments.extend(["--seed".into(), settings.seed.to_string().into()]);
+            arguments.extend(["--speed".into(), settings.speed.to_string().into()]);
+            if let Some(tracks) = settings.tracks {
+                arguments.extend(["--tracks".into(), tracks.into()]);
+            }
+        }
+        if settings.lockstep {
+            arguments.push("--lockstep".into());
+        }
+        Program { name: name.to_owned(), arguments, policy }
+    }
+
+    fn until_ready(&mut self, index: usize) -> Result<(), ConductError> {
+        let mut notices = Vec::new();
+        let interrupted = self.interrupted;
+        let outcome = self.supervisor.wait_until_ready(
+            index,
+            &mut || rescue(&mut self.session),
+            &mut notices,
+            &|| interrupted.load(Ordering::Acquire),
+        );
+        self.tell(notices);
+        Ok(outcome?)
+    }
+
+    fn tell(&mut self, notices: Vec<Notice>) {
+        for Notice(text) in notices {
+            self.progress.say(&text);
+        }
+    }
+
+    /// One process after the other takes its turn, tick by tick.
+    fn in_lockstep(&mut self) -> Result<bool, ConductError> {
+        let mut order = vec![self.world];
+        order.extend(&self.agents);
+        let start = self.settings.scenario.start;
+        let ticks = (self.settings.scenario.duration / TICK).ceil() as u64;
+        let interrupted = self.interrupted;
+        for index in 1..=ticks {
+            let tick = Tick { index, time: tick_time(start, index) };
+            for &member in &order {
+                let mut notices = Vec::new();
+                let outcome = self.supervisor.take_turn(
+                    member,
+                    tick,
+                    &mut || rescue(&mut self.session),
+                    &mut notices,
+                    &|| interrupted.load(Ordering::Acquire),
+                );
+                self.tell(notices);
+                outcome?;
+            }
+            self.record()?;
+            if self.missions_are_over(index % 20 == 0)? {
+                return Ok(true);
+            }
+        }
+        Ok(true)
+    }
+
+    /// The processes run by themselves; this one watches.
+    fn free(&mut self) -> Result<bool, ConductError> {
+        let mut round = 0u64;
+        loop {
+            let mut notices = Vec::new();
+            let deadline = crate::supervise::now() + LOOK;
+            loop {
+                let left = deadline.saturating_duration_since(crate::supervise::now());
+                if left.is_zero() {
+                    break;
+                }
+                let mut rescue = || rescue(&mut self.session);
+                let heard = self.supervisor.hear(left, &mut rescue, &mut notices);
+                self.tell(std::mem::take(&mut notices));
+                heard?;
+            }
+            if self.interrupted.load(Ordering::Acquire) {
+                return Ok(false);
+            }
+            self.record()?;
+            round += 1;
+            if round.is_multiple_of(10) {
+                self.supervisor.note_cpu();
+            }
+            let over = self.missions_are_over(round.is_multiple_of(10))?;
+            let last = self.recording.truths.last().map(|truth| truth.time);
+            let start = self.settings.scenario.start;
+            let late = last.is_some_and(|t| t.since(start) >= self.settings.scenario.duration);
+            if over || late {
+                return Ok(true);
+            }
+        }
+    }
+
+    /// Keeps what the world has told since the last time.
+    fn record(&mut self) -> Result<(), ConductError> {
+        self.recording.truths.extend(self.truth.drain()?);
+        Ok(())
+    }
+
+    fn missions_are_over(&mut self, show: bool) -> Result<bool, ConductError> {
+        let snapshot = self.session.snapshot()?;
+        let missions = match missions(&snapshot) {
+            // Overtaken while reading: the next look sees the next version.
+            Err(ReadError::SnapshotTooOld { .. }) => return Ok(false),
+            other => other?,
+        };
+        if show {
+            let start = self.settings.scenario.start;
+            let now = self.recording.truths.last().map_or(0.0, |truth| truth.time.since(start));
+            let what = missions.iter().find(|m| m.status == "running");
+            let mut step = steps(&snapshot).unwrap_or_default().into_iter();
+            let step = step.rfind(|s| s.status == "running" || s.status == "dispatched");
+            let text = match (what, step) {
+                (Some(mission), Some(step)) => format!("{}: {}", mission.name, step.rule),
+                (Some(mission), None) => mission.name.clone(),
+                _ => String::new(),
+            };
+            self.progress.at(now, self.settings.scenario.duration, &text);
+        }
+        for mission in &missions {
+            let known = self.recording.missions.iter().find(|m| m.name == mission.name);
+            if known.is_none_or(|known| known.status != mission.status) {
+                let reason = if mission.reason.is_empty() { String::new() } else { format!(": {}", mission.reason) };
+                self.progress.say(&format!("mission {} is {}{reason}", mission.name, mission.status));
+            }
+        }
+        let all = missions.len() >= self.settings.scenario.missions.len();
+        let over = |m: &MissionState| matches!(m.status.as_str(), "succeeded" | "failed" | "cancelled");
+        let ended = all && missions.iter().all(over);
+        self.recording.missions = missions;
+        Ok(ended)
+    }
+
+    /// Takes the last of what there is to report, then ends the processes.
+    fn finish(mut self) -> Result<Recording, ConductError> {
+        let snapshot = self.session.snapshot()?;
+        self.recording.missions = missions(&snapshot)?;
+        self.recording.steps = steps(&snapshot)?;
+        let members = std::iter::once(self.store).chain(self.agents.clone());
+        let members: Vec<usize> = members.chain(std::iter::once(self.world)).collect();
+        self.supervisor.stop();
+        self.record()?;
+        self.recording.accounts = members
+            .into_iter()
+            .map(|index| {
+                let (restarts, cpu_seconds) = self.supervisor.account(index);
+                let name = self.supervisor.name(index).to_owned();
+                Account { name, restarts, cpu_seconds }
+            })
+            .collect();
+        Ok(std::mem::take(&mut self.recording))
+    }
+}
+
+fn text(node: &dsr::Node<'_>, attribute: &str) -> Result<String, ReadError> {
+    let value = node.value(attribute)?;
+    Ok(value.as_ref().and_then(Value::as_str).unwrap_or_default().to_owned())
+}
+
+fn number(node: &dsr::Node<'_>, attribute: &str) -> Result<f64, ReadError> {
+    Ok(node.value(attribute)?.as_ref().and_then(Value::as_f64).unwrap_or_default())
+}
+
+/// The missions in the graph, by id.
+fn missions(snapshot: &Snapshot) -> Result<Vec<MissionState>, ReadError> {
+    let Some(kind) = snapshot.schema().find_type("mission") else { return Ok(Vec::new()) };
+    snapshot
+        .nodes_of_type(kind)
+        .map(|node| {
+            let node = node?;
+            Ok(MissionState {
+                name: node.name()?,
+                goal: text(&node, "goal")?,
+                status: text(&node, "status")?,
+                reason: text(&node, "reason")?,
+                replans: number(&node, "replans")? as u64,
+            })
+        })
+        .collect()
+}
+
+/// The steps of all plans in the graph, by id: in the order in which they were planned.
+fn steps(snapshot: &Snapshot) -> Result<Vec<StepState>, ReadError> {
+    let schema = snapshot.schema();
+    let (Some(kind), Some(label)) = (schema.find_type("step"), schema.find_label("has_step")) else {
+        return Ok(Vec::new());
+    };
+    snapshot
+        .nodes_of_type(kind)
+        .map(|node| {
+            let node = node?;
+            let mission = match node.in_edges_of(label).next().transpose()? {
+                Some(edge) => snapshot.find_node(edge.from)?.map(|m| m.name()).transpose()?,
+                None => None,
+            };
+            Ok(StepState {
+                mission: mission.unwrap_or_default(),
+                rule: text(&node, "rule")?,
+                binding: text(&node, "binding")?,
+                status: text(&node, "status")?,
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,55 @@
+//! What a long verb shows while it works: a bar on a terminal, lines elsewhere; always on standard
+//! error, so that standard output holds only the answer.
+
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::IsTerminal;
+
+#[derive(Debug)]
+pub(crate) struct Progress {
+    title: String,
+    bar: Option<ProgressBar>,
+    quiet: bool,
+}
+
+impl Progress {
+    /// Progress of something called `title`; `quiet` shows nothing.
+    pub(crate) fn new(title: &str, quiet: bool) -> Self {
+        let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
+            let bar = ProgressBar::new(1);
+            let style = "{prefix} [{bar:30}] {msg}";
+            if let Ok(style) = ProgressStyle::with_template(style) {
+                bar.set_style(style.progress_chars("=> "));
+            }
+            bar.set_prefix(title.to_owned());
+            bar
+        });
+        Self { title: title.to_owned(), bar, quiet }
+    }
+
+    /// Something happened that is worth a line.
+    #[allow(clippy::print_stderr, reason = "progress is for the person at the terminal")]
+    pub(crate) fn say(&self, line: &str) {
+        match &self.bar {
+            Some(bar) => bar.println(format!("{}: {line}", self.title)),
+            None if !self.quiet => eprintln!("{}: {line}", self.title),
+            None => {}
+        }
+    }
+
+    /// `now` of at most `end` simulated seconds have passed.
+    pub(crate) fn at(&self, now: f64, end: f64, what: &str) {
+        if let Some(bar) = &self.bar {
+            bar.set_length(end.max(1.0) as u64);
+            bar.set_position(now.max(0.0) as u64);
+            bar.set_message(format!("{now:5.1} s of at most {end:.0} s  {what}"));
+        }
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}

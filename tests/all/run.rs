@@ -1,0 +1,177 @@
+//! `cortex run` as its users meet it: whole runs of the shipped scenarios, and what happens when
+//! something goes wrong in the middle of one.
+
+use crate::support::{Program, Run};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+const CARE_CENTRE: &str = "scenarios/care-centre";
+const PLAZA: &str = "scenarios/plaza";
+
+fn report(folder: &Path) -> (String, Value) {
+    let text = fs::read_to_string(folder.join("report.json")).unwrap();
+    let json = serde_json::from_str(&text).unwrap();
+    (text, json)
+}
+
+fn zones(psi: &Value) -> [f64; 4] {
+    ["intimate", "personal", "social", "public"].map(|zone| psi[zone].as_f64().unwrap())
+}
+
+#[test]
+fn the_same_seed_gives_the_same_report_byte_for_byte() {
+    let reports = [(); 2].map(|()| {
+        let run = Run::new("lockstep", &[CARE_CENTRE, "--lockstep", "--seed", "3", "--no-baseline"]);
+        let folder = run.succeed();
+        report(folder.path()).0
+    });
+    assert!(reports[0] == reports[1], "the reports differ:\n{}\n{}", reports[0], reports[1]);
+}
+
+#[test]
+fn the_care_centre_is_crossed_and_reported_beside_the_run_without_social_behaviour() {
+    let run = Run::new("care", &[CARE_CENTRE, "--lockstep", "--seed", "1"]);
+    let folder = run.succeed();
+    let (_, report) = report(folder.path());
+    assert_eq!(report["scenario"], "care-centre");
+    assert_eq!(report["success"], true);
+    for psi in [&report["psi"], &report["psi_moving"], &report["baseline"]["psi"]] {
+        let sum: f64 = zones(psi).iter().sum();
+        assert!((sum - 100.0).abs() < 1e-6, "{psi}");
+    }
+    let close = |psi: &Value| zones(psi)[0] + zones(psi)[1];
+    let (with, without) = (close(&report["psi"]), close(&report["baseline"]["psi"]));
+    assert!(with < without, "in people's space {with} % of the time with, {without} % without");
+    assert!(report["robot"]["path_length"].as_f64().unwrap() > 10.0);
+    assert_eq!(report["robot"]["collisions"], 0);
+    let rules: Vec<&str> =
+        report["plan"].as_array().unwrap().iter().map(|s| s["rule"].as_str().unwrap()).collect();
+    assert!(rules.contains(&"changeRoom") && rules.contains(&"takeTheAttention"), "{rules:?}");
+    assert!(report["agents"].as_array().unwrap().iter().all(|a| a["cpu_seconds"].is_null()));
+    for picture in ["map.svg", "map.png"] {
+        assert!(fs::metadata(folder.path().join(picture)).unwrap().len() > 10_000, "{picture}");
+    }
+}
+
+/// A recording in the shape of `obsmat.txt`: two people who walk across the plaza and back.
+fn recording() -> String {
+    let mut text = String::new();
+    for step in 0..200 {
+        let (frame, t) = (1 + 10 * step, f64::from(step) * 0.4);
+        for (id, y, speed) in [(1, 4.0, 1.2), (2, 8.0, -1.0)] {
+            let (x, v) = if t * f64::abs(speed) < 14.0 { (t * speed, speed) } else { continue };
+            let x = if speed > 0.0 { 0.5 + x } else { 14.5 + x };
+            text.push_str(&format!("{frame} {id} {x} 0 {y} {v} 0 0\n"));
+        }
+    }
+    text
+}
+
+#[test]
+fn recorded_pedestrians_take_the_place_of_simulated_ones() {
+    let folder = tempfile::tempdir().unwrap();
+    let tracks = folder.path().join("obsmat.txt");
+    fs::write(&tracks, recording()).unwrap();
+    let tracks = tracks.to_str().unwrap();
+    let run = Run::new("tracks", &[PLAZA, "--lockstep", "--tracks", tracks, "--no-baseline"]);
+    let folder = run.succeed();
+    let (_, report) = report(folder.path());
+    assert_eq!(report["success"], true);
+    assert_eq!(report["people"].as_array().unwrap().len(), 2);
+}
+
+#[test]
+fn an_agent_that_is_killed_is_restarted_and_the_mission_still_succeeds() {
+    let mut run = Run::new("killed", &[CARE_CENTRE, "--speed", "10", "--no-baseline"]).start();
+    run.until("mission invite is running");
+    for victim in ["navigation", "human_observer", "executive", "store"] {
+        run.kill(victim);
+        run.until(&format!("{victim} ended"));
+    }
+    let folder = run.succeed();
+    let (_, report) = report(folder.path());
+    assert_eq!(report["success"], true);
+    let agents = report["agents"].as_array().unwrap();
+    let restarts = |name| agents.iter().find(|a| a["name"] == name).unwrap()["restarts"].clone();
+    for victim in ["navigation", "human_observer", "executive", "store"] {
+        assert_eq!(restarts(victim), 1, "{victim}");
+    }
+    assert_eq!(restarts("social_mapping"), 0);
+}
+
+#[test]
+fn an_interrupt_ends_every_process_and_leaves_nothing() {
+    let mut run = Run::new("interrupt", &[CARE_CENTRE]).start();
+    run.until("mission invite is running");
+    assert!(!run.processes().is_empty());
+    run.interrupt();
+    assert_eq!(run.exit_code(), 1);
+    run.assert_nothing_is_left();
+}
+
+#[test]
+fn a_supervisor_that_is_killed_takes_its_processes_with_it_and_the_next_run_cleans_up() {
+    let mut run = Run::new("supervisor", &[CARE_CENTRE]).start();
+    run.until("mission invite is running");
+    run.kill_supervisor();
+    run.wait_until_no_process_is_left();
+    let again = Run::on(run.instance_name(), &[CARE_CENTRE, "--lockstep", "--no-baseline"]);
+    again.succeed();
+    run.assert_nothing_is_left();
+}
+
+#[test]
+fn the_live_graph_is_shown_from_another_terminal() {
+    let mut run = Run::new("show", &[CARE_CENTRE]).start();
+    run.until("mission invite is running");
+    let name = run.instance_name().to_owned();
+    let shown = Program::run(&["graph", "show", "robot", "--instance", &name]);
+    assert!(shown.status.success(), "{shown:?}");
+    let text = String::from_utf8(shown.stdout).unwrap();
+    assert!(text.contains("robot : robot") && text.contains("-in-> "), "{text}");
+    let set = Program::run(&["graph", "set", "robot.max_speed", "0.33", "--instance", &name]);
+    assert!(set.status.success(), "{set:?}");
+    let got = Program::run(&["graph", "get", "robot.max_speed", "--instance", &name]);
+    assert_eq!(String::from_utf8(got.stdout).unwrap(), "0.33\n");
+    let wrong = Program::run(&["graph", "get", "robto.max_speed", "--instance", &name]);
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(String::from_utf8(wrong.stderr).unwrap().contains("did you mean `robot`?"));
+    let json = Program::run(&["graph", "export", "json", "--instance", &name]);
+    let json: Value = serde_json::from_slice(&json.stdout).unwrap();
+    assert_eq!(json["format"], "dsr/1");
+    let twice = Program::run(&["run", CARE_CENTRE, "--instance", &name]);
+    assert!(String::from_utf8(twice.stderr).unwrap().contains("is running already"));
+    run.interrupt();
+    assert_eq!(run.exit_code(), 1);
+}
+
+#[test]
+fn a_broken_scenario_is_told_with_line_and_column() {
+    let folder = tempfile::tempdir().unwrap();
+    for file in ["scenario.toml", "rules.aggl"] {
+        let text = fs::read_to_string(crate::support::root().join(CARE_CENTRE).join(file)).unwrap();
+        fs::write(folder.path().join(file), text).unwrap();
+    }
+    fs::create_dir(folder.path().join("missions")).unwrap();
+    for mission in fs::read_dir(crate::support::root().join(CARE_CENTRE).join("missions")).unwrap() {
+        let mission = mission.unwrap();
+        fs::copy(mission.path(), folder.path().join("missions").join(mission.file_name())).unwrap();
+    }
+    let path = folder.path().join("scenario.toml");
+    let good = fs::read_to_string(&path).unwrap();
+    let line = good.lines().position(|line| line == "[robot]").unwrap();
+    fs::write(&path, good.replace("[robot]", "[robott]")).unwrap();
+    let run = Program::run(&["run", folder.path().to_str().unwrap()]);
+    assert_eq!(run.status.code(), Some(2));
+    let told = String::from_utf8(run.stderr).unwrap();
+    assert!(told.contains(&format!(":{}:", line + 1)), "{told}");
+    fs::write(&path, good).unwrap();
+    let rules = folder.path().join("rules.aggl");
+    let text = fs::read_to_string(&rules).unwrap();
+    fs::write(&rules, text.replacen("robot->room1(in)", "robto->room1(in)", 1)).unwrap();
+    let run = Program::run(&["run", folder.path().to_str().unwrap()]);
+    assert_eq!(run.status.code(), Some(2));
+    let told = String::from_utf8(run.stderr).unwrap();
+    assert!(told.contains("rules.aggl:") && told.contains("robot"), "{told}");
+}
