@@ -9,9 +9,11 @@ use crate::messages::{
 };
 use crate::navigation::graph::{Messages, Navigation};
 use crate::object_recognition::ObjectRecognition;
-use crate::social_mapping::graph::{SocialMapping, StepError};
 use crate::social_mapping::config::{ConfigError, SocialConfig};
-use dsr::{AttachError, InstanceError, ReadError, Session, Snapshot, Time, Transaction, TurnError, Turns};
+use crate::social_mapping::graph::{SocialMapping, StepError};
+use dsr::{
+    AttachError, InstanceError, ReadError, Session, Snapshot, Time, Transaction, TurnError, Turns,
+};
 use thiserror::Error;
 
 /// Channel of the social grid, as [`CostGrid::to_bytes`].
@@ -74,7 +76,9 @@ fn perceive(
 /// [`ProcessError`].
 pub fn human_observer(session: Session, turns: Turns) -> Result<(), ProcessError> {
     let mut core = HumanObserver::new(crate::human_observer::Config::default());
-    perceive(session, turns, |now, frames, snapshot| core.step(now, frames, snapshot))
+    perceive(session, turns, |now, frames, snapshot| {
+        core.step(now, frames, snapshot)
+    })
 }
 
 /// Runs object recognition until it shall end.
@@ -83,7 +87,9 @@ pub fn human_observer(session: Session, turns: Turns) -> Result<(), ProcessError
 /// [`ProcessError`].
 pub fn object_recognition(session: Session, turns: Turns) -> Result<(), ProcessError> {
     let mut core = ObjectRecognition::new(crate::object_recognition::Config::default());
-    perceive(session, turns, |now, frames, snapshot| core.step(now, frames, snapshot))
+    perceive(session, turns, |now, frames, snapshot| {
+        core.step(now, frames, snapshot)
+    })
 }
 
 /// Runs social mapping until it shall end.
@@ -140,9 +146,14 @@ pub fn navigation(mut session: Session, mut turns: Turns) -> Result<(), ProcessE
             }
         }
         let snapshot = session.snapshot()?;
-        let messages =
-            Messages { odometry: pose.as_ref(), scan: scan.as_ref(), grid: grid.as_ref() };
-        let Some(effects) = current(core.step(tick.time, &messages, &snapshot))? else { continue };
+        let messages = Messages {
+            odometry: pose.as_ref(),
+            scan: scan.as_ref(),
+            grid: grid.as_ref(),
+        };
+        let Some(effects) = current(core.step(tick.time, &messages, &snapshot))? else {
+            continue;
+        };
         velocity.send(&effects.command)?;
         if let Some(words) = &effects.speech {
             speech.send(words)?;
@@ -152,7 +163,11 @@ pub fn navigation(mut session: Session, mut turns: Turns) -> Result<(), ProcessE
         }
     }
     if let Some(last) = pose {
-        velocity.send(&VelocityCommand { time: last.time, linear: 0.0, angular: 0.0 })?;
+        velocity.send(&VelocityCommand {
+            time: last.time,
+            linear: 0.0,
+            angular: 0.0,
+        })?;
     }
     Ok(())
 }

@@ -19,6 +19,7 @@ use super::obstacles::{Obstacles, Wall, world_hits};
 use super::path::PathError;
 use super::people::{Person, Presence};
 use super::planner::Planner;
+use super::settled::Settled;
 use super::target::{INSIDE, Target, Task, has_moved};
 use crate::grid::CostGrid;
 use crate::messages::{LaserScan, Odometry, VelocityCommand};
@@ -149,6 +150,7 @@ pub struct Output {
 pub struct Navigator {
     config: Config,
     planner: Planner,
+    settled: Settled,
     band: Band,
     anticipation: Anticipation,
     ground: Ground,
@@ -329,17 +331,29 @@ impl Navigator {
             course.planned = None;
         }
         self.band.follow(view.robot.position, 2.0);
-        let decision = self
-            .keep_planned(course, grid, view)
-            .err()
-            .and_then(|hindrance| {
-                let since = *course.hindered.get_or_insert(view.now);
-                let given_up = view.now.since(since) > self.config.unreachable_after;
-                // A way found earlier still leads on; people who block a new one will walk away.
-                let stands = self.band.points().is_empty() || given_up;
-                stands.then(|| (STAND, hindrance.status(given_up)))
-            });
-        decision.unwrap_or_else(|| self.drive(course, view))
+        let mut settled = std::mem::take(&mut self.settled);
+        let walkers = if view.inputs.social {
+            view.inputs.people
+        } else {
+            &[]
+        };
+        settled.observe(view.now, grid, walkers);
+        let decision = self.go_on(course, settled.grid(), view);
+        self.settled = settled;
+        decision
+    }
+
+    /// Plans where it must and drives where it can.
+    fn go_on(&mut self, course: &mut Course, grid: &CostGrid, view: &View) -> Decision {
+        let hindrance = self.keep_planned(course, grid, view).err();
+        let stands = hindrance.and_then(|hindrance| {
+            let since = *course.hindered.get_or_insert(view.now);
+            let given_up = view.now.since(since) > self.config.unreachable_after;
+            // A way found earlier still leads on; people who block a new one will walk away.
+            let stands = self.band.points().is_empty() || given_up;
+            stands.then(|| (STAND, hindrance.status(given_up)))
+        });
+        stands.unwrap_or_else(|| self.drive(course, grid, view))
     }
 
     /// Takes in the laser and the map. Whoever walks will be elsewhere when the robot gets there, so

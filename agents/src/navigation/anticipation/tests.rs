@@ -40,7 +40,7 @@ fn carry_out(mut people: Vec<Person>, line: &[Point2<f64>], seconds: f64) -> (f6
             people: &people,
             ground: &ground,
             limits: &LIMITS,
-            waited: step as f64 * 0.1,
+            lost: step as f64 * 0.1,
             addressee: None,
         };
         let choice = anticipation.choose(&robot, &scene);
@@ -73,7 +73,7 @@ fn with_nobody_near_the_line_is_followed_at_top_speed() {
         people: &far,
         ground: &ground,
         limits: &LIMITS,
-        waited: 0.0,
+        lost: 0.0,
         addressee: None,
     };
     let choice = Anticipation::default().choose(&robot, &scene);

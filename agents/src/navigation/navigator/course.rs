@@ -19,9 +19,16 @@ pub(super) struct Course {
     pub(super) planned: Option<Time>,
     /// The least price that the band has had since it was planned.
     pub(super) price: f64,
-    /// The shortest way that was left, and since when.
+    /// The way that was left at the last step, metres.
+    pub(super) left: f64,
+    /// The shortest way that was left, whatever became of it.
     pub(super) shortest: f64,
+    /// The way that was left when it had last become noticeably shorter, and when that was. A way
+    /// that turns out longer is noted anew.
+    pub(super) noted: f64,
     pub(super) headway: Time,
+    /// The time lost so far, seconds: it grows with the clock and shrinks with the headway.
+    pub(super) lost: f64,
     pub(super) recoveries: u32,
     pub(super) backing_until: Option<Time>,
     /// Since when there has been no way, or no sight of the person.
@@ -73,8 +80,11 @@ impl Course {
             person: Point2::origin(),
             planned: None,
             price: f64::INFINITY,
+            left: f64::INFINITY,
             shortest: f64::INFINITY,
+            noted: f64::INFINITY,
             headway: now,
+            lost: 0.0,
             recoveries: 0,
             backing_until: None,
             hindered: None,

@@ -4,10 +4,15 @@
 use super::course::{Care, Course};
 use super::replan::person_of;
 use super::{Cause, Decision, Failure, Navigator, STAND, Status, View};
+use crate::grid::CostGrid;
 use crate::navigation::anticipation::{Manoeuvre, Scene};
 use crate::navigation::band::{BandState, Surroundings};
 use crate::navigation::control::{Motion, follow};
+use crate::navigation::people::Person;
 use crate::navigation::target::Target;
+
+/// The headway that the robot makes in a second at top speed makes up for so many lost seconds.
+const HEADWAY_WORTH: f64 = 3.0;
 
 impl Navigator {
     /// Lets the band move.
@@ -28,35 +33,29 @@ impl Navigator {
     }
 
     /// Follows the band, watches the headway.
-    pub(super) fn drive(&mut self, course: &mut Course, view: &View) -> Decision {
+    pub(super) fn drive(&mut self, course: &mut Course, grid: &CostGrid, view: &View) -> Decision {
         let broken = matches!(self.relax(view, 2), BandState::Broken { .. });
         let age = course
             .planned
             .map_or(0.0, |planned| view.now.since(planned));
-        let left = self.band.length();
-        if left < course.shortest - 0.2 {
-            course.shortest = left;
-            course.headway = view.now;
-            course.recoveries = 0;
-        }
-        let waited = view.now.since(course.headway);
+        let waited = self.count_headway(course, view);
         if waited > self.config.give_up_after {
             return (STAND, Status::Failed(Failure::Stuck));
         }
         let due = self.config.recover_after * f64::from(course.recoveries + 1);
         if waited > due {
             course.recoveries += 1;
-            // Every other time it makes room first, and plans when it has.
-            if course.recoveries.is_multiple_of(2) {
+            // Every other time it makes room first, and plans when it has; but not blindly back into
+            // the way of people.
+            let walkers = view.inputs.people.iter().any(Person::is_walking);
+            if course.recoveries.is_multiple_of(2) && !(view.inputs.social && walkers) {
                 course.backing_until = Some(view.now + 2.0);
             }
         }
         if waited > due || broken && age >= 0.5 {
             let person = person_of(&course.task, view.inputs.people);
-            if let Some(grid) = view.inputs.grid {
-                // Without a new way the old one is as good as any.
-                course.hindrance = self.plan(course, grid, view, person, Care::Laser).err();
-            }
+            // Without a new way the old one is as good as any.
+            course.hindrance = self.plan(course, grid, view, person, Care::Laser).err();
         }
         let limits = &view.inputs.limits;
         let line = self.band.points();
@@ -76,7 +75,7 @@ impl Navigator {
             people: view.inputs.people,
             ground: &self.ground,
             limits,
-            waited,
+            lost: course.lost,
             addressee,
         };
         let choice = self.anticipation.choose(&view.robot, &scene);
@@ -88,6 +87,27 @@ impl Navigator {
             Status::Moving
         };
         (choice.motion, status)
+    }
+
+    /// Takes account of the way that is left; for how long it has not become shorter, seconds.
+    fn count_headway(&self, course: &mut Course, view: &View) -> f64 {
+        let left = self.band.length();
+        course.left = left;
+        let since = self
+            .last
+            .map_or(0.0, |last| view.now.since(last.time).clamp(0.0, 1.0));
+        course.lost += since;
+        if left < course.shortest {
+            let worth = HEADWAY_WORTH / view.inputs.limits.max_speed.max(0.05);
+            course.lost = (course.lost - (course.shortest - left) * worth).max(0.0);
+            course.shortest = left;
+        }
+        if left < course.noted - 0.2 {
+            course.noted = left;
+            course.headway = view.now;
+            course.recoveries = 0;
+        }
+        view.now.since(course.headway)
     }
 
     /// Backs off slowly, or turns where there is no room behind.

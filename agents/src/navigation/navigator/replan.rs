@@ -108,15 +108,22 @@ impl Navigator {
             point: line_end,
             ..destination
         });
+        let led_elsewhere =
+            person.is_some_and(|person| has_moved(course.person, person.position()));
         course.person = person.map_or(robot, Person::position);
         course.at_place = false;
         self.band = Band::new(&line, &self.config.gains);
         self.relax(view, 20);
         course.price = price(grid, self.band.points()).cost;
         let length = self.band.length();
-        if length > course.shortest + 0.5 {
+        // A person who walked off is no fault of the way; anything else that makes it longer is.
+        if course.left.is_infinite() || led_elsewhere {
             course.shortest = length;
         }
+        if course.left.is_infinite() || length > course.left + 0.5 {
+            course.noted = length;
+        }
+        course.left = length;
         Ok(())
     }
 
