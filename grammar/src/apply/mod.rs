@@ -2,10 +2,6 @@
 //!
 //! Guarantee: a rule is only ever turned into operations at a binding at which its left side and
 //! precondition hold, and the operations make the right side and the effects hold.
-//!
-//! Where the parts of a rule contradict each other: what the right side (or a creating effect)
-//! wants is there afterwards even if an effect unlinks it; a deleted node is gone with whatever
-//! else was said of it; two values for one attribute, or two types for one node, are refused.
 
 mod change;
 mod effect;
@@ -80,6 +76,11 @@ impl Grammar {
     /// created, attributes set. Created nodes are named after their type, with the first number
     /// that makes the name unique in this snapshot. Conditions and values in effects are read in
     /// `snapshot`, before any change.
+    ///
+    /// Where the parts of a rule contradict each other: what the right side or a linking effect
+    /// wants is there afterwards even if an effect unlinks it; a deleted node is gone with
+    /// whatever else was said of it; two values for one attribute, or two types for one node, are
+    /// refused.
     ///
     /// # Errors
     /// [`ApplyError`]; an [`Obstacle`] in it says what does not hold.

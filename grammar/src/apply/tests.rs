@@ -337,4 +337,27 @@ proptest! {
             }
         }
     }
+
+    #[test]
+    fn a_rule_that_was_never_checked_is_refused_at_worst(
+        model in Model::strategy(),
+        rule in FEW.rule(),
+    ) {
+        let mut grammar = Grammar::default();
+        grammar.rules.push(rule);
+        let rule = &grammar.rules[0];
+        let graph = model.to_graph();
+        let snapshot = graph.snapshot();
+        let nodes = snapshot.nodes().map(|node| node.unwrap().id());
+        let binding: Binding =
+            rule.bound_nodes().map(|node| node.variable.clone()).zip(nodes).collect();
+        if let Ok(matches) = grammar.matches(&snapshot, rule, &Binding::new()) {
+            for binding in matches.take(10) {
+                let _ = grammar.apply(&snapshot, &rule.name, &binding.unwrap());
+            }
+        }
+        let _ = grammar.apply(&snapshot, &rule.name, &binding);
+        let _ = grammar.outcome_obstacle(&snapshot, rule, &binding);
+        let _ = grammar.cost(&snapshot, rule, &binding);
+    }
 }
