@@ -63,9 +63,13 @@ fn known_keys() -> BTreeSet<String> {
     let wrong = "of_no_use = 1";
     let example = blocks("scenario-files", "toml").remove(0) + MORE_TABLES;
     let example = example.replace("{ after", &format!("{{ {wrong}, after"));
-    let lines = example.lines().map(|line| match line.starts_with('[') {
-        true => format!("{line}\n{wrong}\n"),
-        false => format!("{line}\n"),
+    let lines = example.lines().map(|line| {
+        let after = if line.starts_with('[') {
+            format!("{wrong}\n")
+        } else {
+            String::new()
+        };
+        format!("{line}\n{after}")
     });
     let text = format!("{wrong}\n{}", lines.collect::<String>());
     let files = |_: &str| Ok(String::new());
