@@ -63,15 +63,15 @@ fn known_keys() -> BTreeSet<String> {
     let wrong = "of_no_use = 1";
     let example = blocks("scenario-files", "toml").remove(0) + MORE_TABLES;
     let example = example.replace("{ after", &format!("{{ {wrong}, after"));
-    let lines = example.lines().map(|line| {
-        let after = if line.starts_with('[') {
-            format!("{wrong}\n")
-        } else {
-            String::new()
-        };
-        format!("{line}\n{after}")
-    });
-    let text = format!("{wrong}\n{}", lines.collect::<String>());
+    let mut text = format!("{wrong}\n");
+    for line in example.lines() {
+        text.push_str(line);
+        text.push('\n');
+        if line.starts_with('[') {
+            text.push_str(wrong);
+            text.push('\n');
+        }
+    }
     let files = |_: &str| Ok(String::new());
     let invalid = Scenario::parse("scenario.toml", &text, &files).unwrap_err();
     let mut keys = BTreeSet::new();
