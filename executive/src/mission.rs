@@ -1,6 +1,6 @@
 //! The executive's pure core: takes missions in turn, has plans made, hands out their steps, and
 //! plans anew where the world does not go along. It guarantees that all it goes by stands in the
-//! graph (design.md section 4): an executive that is started anew goes on where the last one was,
+//! graph: an executive that is started anew goes on where the last one was,
 //! and a transaction that got lost or came twice does no harm.
 
 mod adopt;

@@ -434,3 +434,51 @@ fn a_hub_of_ten_thousand_edges_comes_and_goes() {
         "the memory of deleted edges is free again"
     );
 }
+
+#[test]
+fn what_the_schema_does_not_have_is_refused_whole_and_told_with_the_right_name() {
+    let schema = Schema::from_toml(
+        "test",
+        "[types]\nroom = []\nrobot = []\n\
+         [labels]\nin = { from = [\"robot\"], to = [\"room\"] }\n\
+         [attributes]\narea = { kind = \"f64\", min = 0.0 }\n",
+    );
+    let mut graph = Graph::in_memory(schema.unwrap());
+    let mut good = Transaction::new();
+    good.create_node("room", "kitchen", vec![("area".into(), 12.0.into())]);
+    good.create_node("robot", "shelly", vec![]);
+    graph.commit(&good, "a", Time::default()).unwrap();
+    let before = Image::of(&graph.snapshot()).unwrap();
+    let mut refused = |operation: &dyn Fn(&mut Transaction), told: &str| {
+        // What comes first is good, and must not stay.
+        let mut transaction = Transaction::new();
+        transaction.create_edge("shelly", "in", "kitchen");
+        operation(&mut transaction);
+        let refusal = graph
+            .commit(&transaction, "a", Time::default())
+            .unwrap_err();
+        assert_eq!(refusal.to_string(), told);
+        assert_eq!(Image::of(&graph.snapshot()).unwrap(), before, "{told}");
+    };
+    refused(
+        &|t| t.create_node("rom", "hall", vec![]),
+        "against the schema: unknown node type `rom`, did you mean `room`?",
+    );
+    refused(
+        &|t| t.create_edge("kitchen", "in", "shelly"),
+        "against the schema: `in` does not join room to robot",
+    );
+    refused(
+        &|t| t.set("kitchen", "are", 1.0),
+        "against the schema: unknown attribute `are`, did you mean `area`?",
+    );
+    refused(
+        &|t| t.set("kitchen", "area", "large"),
+        "against the schema: `area` is a f64, not a string",
+    );
+    refused(
+        &|t| t.set("kitchen", "area", -1.0),
+        "against the schema: `area` must lie in [0, inf], not -1",
+    );
+    refused(&|t| t.delete_node("hall"), "there is no `hall`");
+}
