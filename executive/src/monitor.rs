@@ -199,7 +199,7 @@ fn ahead(
     later: &[Step],
     goal: &Goal,
 ) -> Result<Option<String>, ReadError> {
-    let mut touched = Touched::new(&grammar.types, snapshot.schema());
+    let mut touched = Touched::new(&grammar.types, snapshot);
     touched.add(hand.rule, &hand.binding);
     for step in later {
         let Some(ground) = ground(grammar, snapshot, step)? else {
@@ -225,7 +225,7 @@ fn ahead(
         GoalConstants::Found(constants) => constants,
         GoalConstants::Missing(obstacle) => return Ok(Some(obstacle.to_string())),
     };
-    let rest = touched.needed_for(goal, &constants);
+    let rest = touched.needed_for(goal, &constants)?;
     let obstacle = words(grammar.goal_obstacle(snapshot, &rest))?;
     Ok(obstacle.map(|what| format!("the plan will not reach the goal: {what}")))
 }

@@ -144,6 +144,17 @@ fn whom_the_plan_aims_at_is_watched_though_the_goal_names_nobody() {
 }
 
 #[test]
+fn what_the_robot_itself_brings_about_is_not_taken_for_somebody_elses() {
+    // The robot comes to be in the ward, and so must whoever looks at it.
+    let goal = r#"{ p:person "shelly":robot "ward":room
+        p->"ward"(in) "shelly"->"ward"(in) p->"shelly"(front) }"#;
+    let mut house = House::new(&[("greet", goal, 0)]);
+    house.run(12);
+    expect!["succeeded, 0: the goal holds"].assert_eq(&house.mission("greet"));
+    assert_eq!(house.planner.asked.get(), 1);
+}
+
+#[test]
 fn a_left_side_that_breaks_stops_the_step() {
     let mut house = House::new(&[("go", GO_TO_WARD, 0)]);
     house.agent = Agent::Hangs;
@@ -249,6 +260,8 @@ fn without_a_plan_it_waits_and_plans_once_perception_has_seen() {
         transaction.create_node("person", "ana", vec![]);
         transaction.create_edge("ana", "in", "hall");
     });
+    house.run(2);
+    expect!["running, 0: "].assert_eq(&house.mission("greet"));
     house.run(12);
     expect!["succeeded, 0: the goal holds"].assert_eq(&house.mission("greet"));
 }

@@ -3,7 +3,7 @@
 //! it keeps is necessary for the plan; where it cannot tell whether a step changes something, that
 //! is left out.
 
-use dsr::{NodeId, Schema};
+use dsr::{NodeId, ReadError, Snapshot};
 use grammar::{
     AttributePath, Binding, Constant, Effect, Goal, Name, Pattern, PatternNode, Rule, Types,
 };
@@ -17,7 +17,7 @@ const ANY: &str = "*";
 #[derive(Debug)]
 pub(super) struct Touched<'a> {
     types: &'a Types,
-    schema: &'a Schema,
+    snapshot: &'a Snapshot,
     edges: Vec<(Option<NodeId>, Option<Name>, Option<NodeId>)>,
     /// Links that come about in any case.
     made: Vec<(NodeId, Name, NodeId)>,
@@ -34,10 +34,10 @@ fn meets<T: PartialEq>(one: Option<&T>, other: Option<&T>) -> bool {
 
 impl<'a> Touched<'a> {
     /// Nothing yet.
-    pub(super) fn new(types: &'a Types, schema: &'a Schema) -> Self {
+    pub(super) fn new(types: &'a Types, snapshot: &'a Snapshot) -> Self {
         Self {
             types,
-            schema,
+            snapshot,
             edges: Vec::new(),
             made: Vec::new(),
             attributes: Vec::new(),
@@ -97,13 +97,11 @@ impl<'a> Touched<'a> {
 
     /// Whether nodes of that type or its kin may come or go.
     fn populates(&self, type_name: &str) -> bool {
+        let schema = self.snapshot.schema();
         let below = |special: &str, general: &str| {
-            let known = self
-                .schema
-                .find_type(special)
-                .zip(self.schema.find_type(general));
+            let known = schema.find_type(special).zip(schema.find_type(general));
             self.types.is_subtype(special, general)
-                || known.is_some_and(|(special, general)| self.schema.is_subtype(special, general))
+                || known.is_some_and(|(special, general)| schema.is_subtype(special, general))
         };
         self.population.iter().any(|changing| {
             *changing == ANY || below(changing, type_name) || below(type_name, changing)
@@ -189,19 +187,43 @@ impl<'a> Touched<'a> {
         (needed, kept)
     }
 
+    /// Whether the node can stand for that variable of the goal, of which `aim` is known so far.
+    fn fits(
+        &self,
+        goal: &Goal,
+        aim: &Binding,
+        variable: &Name,
+        id: NodeId,
+    ) -> Result<bool, ReadError> {
+        if let Some(known) = aim.get(variable) {
+            return Ok(known == id);
+        }
+        let (Some(wanted), Some(node)) =
+            (goal.pattern.node(variable), self.snapshot.find_node(id)?)
+        else {
+            return Ok(false);
+        };
+        let schema = self.snapshot.schema();
+        let wanted_id = schema.find_type(&wanted.type_name);
+        let is_kin = wanted_id.is_some_and(|general| schema.is_subtype(node.type_id(), general))
+            || self.types.is_subtype(node.type_name(), &wanted.type_name);
+        Ok(is_kin && !aim.iter().any(|(_, taken)| taken == id))
+    }
+
     /// The nodes that the plan makes the goal hold at: its constants, and each variable for which
     /// the steps make but one link of the goal's.
-    fn aimed_at(&self, goal: &Goal, constants: &Binding) -> Binding {
+    fn aimed_at(&self, goal: &Goal, constants: &Binding) -> Result<Binding, ReadError> {
         let mut aim = constants.clone();
         for edge in goal.pattern.edges.iter().filter(|edge| !edge.negated) {
-            let (from, to) = (aim.get(&edge.from), aim.get(&edge.to));
-            let mut fitting: Vec<(NodeId, NodeId)> = (self.made.iter())
-                .filter(|(_, label, _)| *label == edge.label)
-                .map(|&(from, _, to)| (from, to))
-                .filter(|(made_from, made_to)| {
-                    meets(Some(made_from), from.as_ref()) && meets(Some(made_to), to.as_ref())
-                })
-                .collect();
+            let mut fitting: Vec<(NodeId, NodeId)> = Vec::new();
+            for (from, label, to) in &self.made {
+                if *label == edge.label
+                    && self.fits(goal, &aim, &edge.from, *from)?
+                    && self.fits(goal, &aim, &edge.to, *to)?
+                {
+                    fitting.push((*from, *to));
+                }
+            }
             fitting.sort_unstable();
             fitting.dedup();
             if let [(from, to)] = fitting[..] {
@@ -209,13 +231,13 @@ impl<'a> Touched<'a> {
                 aim.insert(edge.to.clone(), to);
             }
         }
-        aim
+        Ok(aim)
     }
 
     /// The goal, at the nodes that the plan makes it hold at, with only those parts that hold now
     /// if they ever will.
-    pub(super) fn needed_for(&self, goal: &Goal, constants: &Binding) -> Goal {
-        let constants = &self.aimed_at(goal, constants);
+    pub(super) fn needed_for(&self, goal: &Goal, constants: &Binding) -> Result<Goal, ReadError> {
+        let constants = &self.aimed_at(goal, constants)?;
         let mut needed = goal.clone();
         for (variable, id) in constants.iter() {
             let name = variable.to_string();
@@ -232,7 +254,7 @@ impl<'a> Touched<'a> {
         if free.iter().any(populated) {
             needed.pattern = Pattern::default();
             needed.precondition = None;
-            return needed;
+            return Ok(needed);
         }
         let gone = |node: &PatternNode| constants.get(&node.variable).is_some_and(|c| self.node(c));
         let gone: Vec<Name> = (goal.pattern.nodes.iter())
@@ -254,6 +276,6 @@ impl<'a> Touched<'a> {
             .map(|(variable, id)| (variable.clone(), id))
             .collect();
         needed.precondition = self.conjuncts(goal.precondition.as_ref(), &kept, &free);
-        needed
+        Ok(needed)
     }
 }
