@@ -14,13 +14,17 @@ pub(crate) struct Cli {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Verb {
     /// Run a scenario: a store, a world and the agents, each a process; then report
-    #[command(after_help = "Example:\n  cortex run scenarios/care-centre --speed 5 --report report")]
+    #[command(
+        after_help = "Example:\n  cortex run scenarios/care-centre --speed 5 --report report"
+    )]
     Run(Run),
     /// Run one agent of an instance by hand
     #[command(after_help = "Example:\n  cortex agent human_observer --instance default")]
     Agent(Agent),
     /// Run the store of an instance by hand
-    #[command(after_help = "Example:\n  cortex store --scenario scenarios/care-centre --instance mine")]
+    #[command(
+        after_help = "Example:\n  cortex store --scenario scenarios/care-centre --instance mine"
+    )]
     Store(Store),
     /// Look at and change the shared graph of a running instance, or a graph file
     #[command(after_help = "Example:\n  cortex graph show --instance default")]
@@ -36,6 +40,10 @@ pub(crate) struct InstanceArgs {
 }
 
 #[derive(Debug, Clone, Args)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "each is a flag of the command line"
+)]
 pub(crate) struct Run {
     /// Folder of the scenario
     pub(crate) scenario: PathBuf,
@@ -79,7 +87,7 @@ fn speed(text: &str) -> Result<f64, String> {
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Agent {
-    /// human_observer, object_recognition, social_mapping, navigation, executive or world
+    /// `human_observer`, `object_recognition`, `social_mapping`, `navigation`, `executive` or `world`
     pub(crate) name: String,
     /// Folder of the scenario; executive and world need it
     #[arg(long, value_name = "DIR")]
@@ -133,7 +141,13 @@ pub(crate) struct Graph {
 #[derive(Debug, Clone, Args)]
 pub(crate) struct GraphSource {
     /// Name of the running system on this host
-    #[arg(long, value_name = "I", default_value = "default", global = true, conflicts_with = "file")]
+    #[arg(
+        long,
+        value_name = "I",
+        default_value = "default",
+        global = true,
+        conflicts_with = "file"
+    )]
     pub(crate) instance: String,
     /// A graph file instead of a running system
     #[arg(long, value_name = "FILE", global = true)]

@@ -122,8 +122,12 @@ fn run(
     progress: &mut Progress,
 ) -> Result<Option<Recording>, ConductError> {
     let mut conductor = Conductor::start(settings, interrupted, progress)?;
-    let ended = if settings.lockstep { conductor.in_lockstep()? } else { conductor.free()? };
-    Ok(ended.then(|| conductor.finish()).transpose()?)
+    let ended = if settings.lockstep {
+        conductor.in_lockstep()?
+    } else {
+        conductor.free()?
+    };
+    ended.then(|| conductor.finish()).transpose()
 }
 
 /// The store's rescue: saves the graph as this process still sees it, for the next store.
@@ -131,7 +135,8 @@ fn rescue(session: &mut Session) -> Result<Vec<OsString>, String> {
     let snapshot = session.snapshot().map_err(|error| error.to_string())?;
     let image = Image::of(&snapshot).map_err(|error| error.to_string())?;
     let path = session.instance().folder().join("graph.image");
-    std::fs::write(&path, image.to_bytes()).map_err(|error| format!("{}: {error}", path.display()))?;
+    std::fs::write(&path, image.to_bytes())
+        .map_err(|error| format!("{}: {error}", path.display()))?;
     Ok(vec!["--restore".into(), path.into()])
 }
 
@@ -143,8 +148,9 @@ impl<'a> Conductor<'a> {
     ) -> Result<Self, ConductError> {
         let hold = Hold::take(&settings.instance)
             .map_err(|report| ConductError::Hold(format!("{report}")))?;
-        let executable = std::env::current_exe().map_err(|source| {
-            SuperviseError::Start { process: "cortex".to_owned(), source }
+        let executable = std::env::current_exe().map_err(|source| SuperviseError::Start {
+            process: "cortex".to_owned(),
+            source,
         })?;
         let session = Session::join(&settings.instance, "supervisor")?;
         let truth = session.subscriber(TRUTH)?;
@@ -188,7 +194,11 @@ impl<'a> Conductor<'a> {
         if !settings.social {
             arguments.push("--no-social".into());
         }
-        Program { name: "store".to_owned(), arguments, policy: Policy::RestartWithGraph }
+        Program {
+            name: "store".to_owned(),
+            arguments,
+            policy: Policy::RestartWithGraph,
+        }
     }
 
     fn agent_program(&self, name: &str, policy: Policy) -> Program {
@@ -206,7 +216,11 @@ impl<'a> Conductor<'a> {
         if settings.lockstep {
             arguments.push("--lockstep".into());
         }
-        Program { name: name.to_owned(), arguments, policy }
+        Program {
+            name: name.to_owned(),
+            arguments,
+            policy,
+        }
     }
 
     fn until_ready(&mut self, index: usize) -> Result<(), ConductError> {
@@ -236,7 +250,10 @@ impl<'a> Conductor<'a> {
         let ticks = (self.settings.scenario.duration / TICK).ceil() as u64;
         let interrupted = self.interrupted;
         for index in 1..=ticks {
-            let tick = Tick { index, time: tick_time(start, index) };
+            let tick = Tick {
+                index,
+                time: tick_time(start, index),
+            };
             for &member in &order {
                 let mut notices = Vec::new();
                 let outcome = self.supervisor.take_turn(
@@ -306,7 +323,11 @@ impl<'a> Conductor<'a> {
         };
         if show {
             let start = self.settings.scenario.start;
-            let now = self.recording.truths.last().map_or(0.0, |truth| truth.time.since(start));
+            let now = self
+                .recording
+                .truths
+                .last()
+                .map_or(0.0, |truth| truth.time.since(start));
             let what = missions.iter().find(|m| m.status == "running");
             let mut step = steps(&snapshot).unwrap_or_default().into_iter();
             let step = step.rfind(|s| s.status == "running" || s.status == "dispatched");
@@ -315,17 +336,30 @@ impl<'a> Conductor<'a> {
                 (Some(mission), None) => mission.name.clone(),
                 _ => String::new(),
             };
-            self.progress.at(now, self.settings.scenario.duration, &text);
+            self.progress
+                .at(now, self.settings.scenario.duration, &text);
         }
         for mission in &missions {
-            let known = self.recording.missions.iter().find(|m| m.name == mission.name);
+            let known = self
+                .recording
+                .missions
+                .iter()
+                .find(|m| m.name == mission.name);
             if known.is_none_or(|known| known.status != mission.status) {
-                let reason = if mission.reason.is_empty() { String::new() } else { format!(": {}", mission.reason) };
-                self.progress.say(&format!("mission {} is {}{reason}", mission.name, mission.status));
+                let reason = if mission.reason.is_empty() {
+                    String::new()
+                } else {
+                    format!(": {}", mission.reason)
+                };
+                self.progress.say(&format!(
+                    "mission {} is {}{reason}",
+                    mission.name, mission.status
+                ));
             }
         }
         let all = missions.len() >= self.settings.scenario.missions.len();
-        let over = |m: &MissionState| matches!(m.status.as_str(), "succeeded" | "failed" | "cancelled");
+        let over =
+            |m: &MissionState| matches!(m.status.as_str(), "succeeded" | "failed" | "cancelled");
         let ended = all && missions.iter().all(over);
         self.recording.missions = missions;
         Ok(ended)
@@ -345,7 +379,11 @@ impl<'a> Conductor<'a> {
             .map(|index| {
                 let (restarts, cpu_seconds) = self.supervisor.account(index);
                 let name = self.supervisor.name(index).to_owned();
-                Account { name, restarts, cpu_seconds }
+                Account {
+                    name,
+                    restarts,
+                    cpu_seconds,
+                }
             })
             .collect();
         Ok(std::mem::take(&mut self.recording))
@@ -354,16 +392,26 @@ impl<'a> Conductor<'a> {
 
 fn text(node: &dsr::Node<'_>, attribute: &str) -> Result<String, ReadError> {
     let value = node.value(attribute)?;
-    Ok(value.as_ref().and_then(Value::as_str).unwrap_or_default().to_owned())
+    Ok(value
+        .as_ref()
+        .and_then(Value::as_str)
+        .unwrap_or_default()
+        .to_owned())
 }
 
 fn number(node: &dsr::Node<'_>, attribute: &str) -> Result<f64, ReadError> {
-    Ok(node.value(attribute)?.as_ref().and_then(Value::as_f64).unwrap_or_default())
+    Ok(node
+        .value(attribute)?
+        .as_ref()
+        .and_then(Value::as_f64)
+        .unwrap_or_default())
 }
 
 /// The missions in the graph, by id.
 fn missions(snapshot: &Snapshot) -> Result<Vec<MissionState>, ReadError> {
-    let Some(kind) = snapshot.schema().find_type("mission") else { return Ok(Vec::new()) };
+    let Some(kind) = snapshot.schema().find_type("mission") else {
+        return Ok(Vec::new());
+    };
     snapshot
         .nodes_of_type(kind)
         .map(|node| {
@@ -382,7 +430,8 @@ fn missions(snapshot: &Snapshot) -> Result<Vec<MissionState>, ReadError> {
 /// The steps of all plans in the graph, by id: in the order in which they were planned.
 fn steps(snapshot: &Snapshot) -> Result<Vec<StepState>, ReadError> {
     let schema = snapshot.schema();
-    let (Some(kind), Some(label)) = (schema.find_type("step"), schema.find_label("has_step")) else {
+    let (Some(kind), Some(label)) = (schema.find_type("step"), schema.find_label("has_step"))
+    else {
         return Ok(Vec::new());
     };
     snapshot
@@ -390,7 +439,10 @@ fn steps(snapshot: &Snapshot) -> Result<Vec<StepState>, ReadError> {
         .map(|node| {
             let node = node?;
             let mission = match node.in_edges_of(label).next().transpose()? {
-                Some(edge) => snapshot.find_node(edge.from)?.map(|m| m.name()).transpose()?,
+                Some(edge) => snapshot
+                    .find_node(edge.from)?
+                    .map(|m| m.name())
+                    .transpose()?,
                 None => None,
             };
             Ok(StepState {

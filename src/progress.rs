@@ -23,11 +23,18 @@ impl Progress {
             bar.set_prefix(title.to_owned());
             bar
         });
-        Self { title: title.to_owned(), bar, quiet }
+        Self {
+            title: title.to_owned(),
+            bar,
+            quiet,
+        }
     }
 
     /// Something happened that is worth a line.
-    #[allow(clippy::print_stderr, reason = "progress is for the person at the terminal")]
+    #[allow(
+        clippy::print_stderr,
+        reason = "progress is for the person at the terminal"
+    )]
     pub(crate) fn say(&self, line: &str) {
         match &self.bar {
             Some(bar) => bar.println(format!("{}: {line}", self.title)),

@@ -11,8 +11,13 @@ use std::time::Duration;
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// The agents, in the order of their turns.
-pub(crate) const AGENTS: [&str; 5] =
-    ["human_observer", "object_recognition", "social_mapping", "navigation", "executive"];
+pub(crate) const AGENTS: [&str; 5] = [
+    "human_observer",
+    "object_recognition",
+    "social_mapping",
+    "navigation",
+    "executive",
+];
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     let instance = super::instance(&arguments.instance.instance)?;
@@ -23,7 +28,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
             || format!("one of {}", known().collect::<Vec<_>>().join(", ")),
             |known| format!("did you mean `{known}`?"),
         );
-        return Err(Failure::input_with_help(format!("there is no agent `{name}`"), help));
+        return Err(Failure::input_with_help(
+            format!("there is no agent `{name}`"),
+            help,
+        ));
     }
     let scenario = || -> Result<Scenario, Failure> {
         let folder = arguments.scenario.as_ref().ok_or_else(|| {
@@ -46,7 +54,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
             let tracks = tracks.map_err(|error| Failure::Input(error.into()))?;
             let world = World::new(&scenario, arguments.seed, tracks);
             let session = attach(&instance, name)?;
-            scenarios::process::run(session, begin()?, world, arguments.speed).map_err(Failure::internal)
+            scenarios::process::run(session, begin()?, world, arguments.speed)
+                .map_err(Failure::internal)
         }
         "executive" => {
             let scenario = scenario()?;

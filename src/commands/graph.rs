@@ -17,12 +17,12 @@ const PATIENCE: Duration = Duration::from_secs(2);
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     let source = &arguments.source;
     let done = match &arguments.action {
-        GraphAction::Show { what } => show(&mut Source::open(source)?, what.as_deref(), source.json),
+        GraphAction::Show { what } => {
+            show(&mut Source::open(source)?, what.as_deref(), source.json)
+        }
         GraphAction::Get { path } => get(&mut Source::open(source)?, path, source.json),
         GraphAction::Set { path, value } => set(source, path, value),
-        GraphAction::Watch { filter, count } => {
-            watch(source, filter.as_deref(), *count)
-        }
+        GraphAction::Watch { filter, count } => watch(source, filter.as_deref(), *count),
         GraphAction::Export { format } => export(&mut Source::open(source)?, format),
     };
     done.map(|()| Answer::Yes)
@@ -63,11 +63,14 @@ fn attach(name: &str) -> Result<Session, Failure> {
 
 /// Reads a graph file into a graph of this process.
 pub(crate) fn read_graph(path: &Path) -> Result<Graph, Failure> {
-    let place = |error: &dyn std::fmt::Display| Failure::input(format!("{}: {error}", path.display()));
+    let place =
+        |error: &dyn std::fmt::Display| Failure::input(format!("{}: {error}", path.display()));
     let text = std::fs::read_to_string(path).map_err(|error| place(&error))?;
     let transaction = json::from_json(&text).map_err(|error| place(&error))?;
     let mut graph = Graph::in_memory(Schema::open());
-    graph.commit(&transaction, "file", Time::default()).map_err(|error| place(&error))?;
+    graph
+        .commit(&transaction, "file", Time::default())
+        .map_err(|error| place(&error))?;
     Ok(graph)
 }
 
@@ -80,7 +83,13 @@ fn show(source: &mut Source, what: Option<&str>, as_json: bool) -> Result<(), Fa
     let mut text = String::new();
     let read = || -> Result<(), dsr::ReadError> {
         let schema = snapshot.schema();
-        let name = |id| Ok(snapshot.find_node(id)?.map(|n| n.name()).transpose()?.unwrap_or_default());
+        let name = |id| {
+            Ok(snapshot
+                .find_node(id)?
+                .map(|n| n.name())
+                .transpose()?
+                .unwrap_or_default())
+        };
         let heading = format!(
             "version {}, {} nodes, {} edges\n",
             snapshot.version(),
@@ -89,7 +98,9 @@ fn show(source: &mut Source, what: Option<&str>, as_json: bool) -> Result<(), Fa
         );
         text.push_str(&heading);
         for id in nodes {
-            let Some(node) = snapshot.find_node(id)? else { continue };
+            let Some(node) = snapshot.find_node(id)? else {
+                continue;
+            };
             // Writing to a string does not fail.
             let _ = writeln!(text, "\n{} : {}  (id {id})", node.name()?, node.type_name());
             for attribute in node.attributes()? {
@@ -100,7 +111,11 @@ fn show(source: &mut Source, what: Option<&str>, as_json: bool) -> Result<(), Fa
                 let target: Result<String, dsr::ReadError> = name(key.to);
                 let _ = writeln!(text, "    -{}-> {}", schema.label_name(key.label), target?);
                 let edge = snapshot.find_edge(key)?;
-                for attribute in edge.map(|edge| edge.attributes()).transpose()?.unwrap_or_default() {
+                for attribute in edge
+                    .map(|edge| edge.attributes())
+                    .transpose()?
+                    .unwrap_or_default()
+                {
                     let _ = writeln!(text, "        {}", attribute_line(&snapshot, &attribute)?);
                 }
             }
@@ -115,7 +130,10 @@ fn show(source: &mut Source, what: Option<&str>, as_json: bool) -> Result<(), Fa
 fn selected(snapshot: &Snapshot, what: Option<&str>) -> Result<Vec<dsr::NodeId>, Failure> {
     let read = || -> Result<Option<Vec<dsr::NodeId>>, dsr::ReadError> {
         let mut nodes: Vec<dsr::NodeId> = match what {
-            None => snapshot.nodes().map(|n| n.map(|n| n.id())).collect::<Result<_, _>>()?,
+            None => snapshot
+                .nodes()
+                .map(|n| n.map(|n| n.id()))
+                .collect::<Result<_, _>>()?,
             Some(what) => match snapshot.schema().find_type(what) {
                 Some(kind) => {
                     let nodes = snapshot.nodes_of_type(kind);
@@ -136,8 +154,16 @@ fn selected(snapshot: &Snapshot, what: Option<&str>) -> Result<Vec<dsr::NodeId>,
 
 /// The failure for a name that nothing has, with the nearest that something has.
 fn no_such(snapshot: &Snapshot, name: &str, what: &str) -> Failure {
-    let names: Vec<String> = snapshot.nodes().flatten().filter_map(|node| node.name().ok()).collect();
-    let types = snapshot.schema().types().iter().map(|kind| kind.name.as_str());
+    let names: Vec<String> = snapshot
+        .nodes()
+        .flatten()
+        .filter_map(|node| node.name().ok())
+        .collect();
+    let types = snapshot
+        .schema()
+        .types()
+        .iter()
+        .map(|kind| kind.name.as_str());
     let known = dsr::suggest(name, names.iter().map(String::as_str).chain(types));
     let help = known.map_or_else(
         || "`cortex graph show` lists what there is".to_owned(),
@@ -152,7 +178,10 @@ fn attribute_line(snapshot: &Snapshot, attribute: &Attribute) -> Result<String, 
         Value::Pose(pose) => {
             let floor = dsr::pose_on_floor(pose);
             let (x, y) = (floor.translation.x, floor.translation.y);
-            format!("({x:.3}, {y:.3}) m, heading {:.3} rad", floor.rotation.angle())
+            format!(
+                "({x:.3}, {y:.3}) m, heading {:.3} rad",
+                floor.rotation.angle()
+            )
         }
         Value::F64(x) => format!("{x}"),
         Value::Vector(row) | Value::F64List(row) => {
@@ -162,12 +191,18 @@ fn attribute_line(snapshot: &Snapshot, attribute: &Attribute) -> Result<String, 
         other => json::value_to_json(other).to_string(),
     };
     if value.chars().count() > 90 {
-        let end = value.char_indices().nth(80).map_or(value.len(), |(at, _)| at);
+        let end = value
+            .char_indices()
+            .nth(80)
+            .map_or(value.len(), |(at, _)| at);
         value.truncate(end);
         value.push_str(" ...");
     }
     let writer = snapshot.writer_name(attribute.writer)?;
-    Ok(format!("{name} = {value}   [{writer}, version {}]", attribute.version))
+    Ok(format!(
+        "{name} = {value}   [{writer}, version {}]",
+        attribute.version
+    ))
 }
 
 /// `NODE.ATTRIBUTE`, or `FROM-LABEL->TO.ATTRIBUTE`.
@@ -195,7 +230,10 @@ fn parse_path(path: &str) -> Result<(Owner, String), Failure> {
 
 fn find_attribute(snapshot: &Snapshot, path: &str) -> Result<Attribute, Failure> {
     let (owner, name) = parse_path(path)?;
-    let attribute = snapshot.schema().attribute_id(&name).map_err(Failure::input)?;
+    let attribute = snapshot
+        .schema()
+        .attribute_id(&name)
+        .map_err(Failure::input)?;
     let find = |node: &NodeRef| -> Result<dsr::NodeId, Failure> {
         let found = match node {
             NodeRef::Id(id) => snapshot.find_node(*id),
@@ -212,8 +250,15 @@ fn find_attribute(snapshot: &Snapshot, path: &str) -> Result<Attribute, Failure>
             node.map(|node| node.attribute(attribute)).transpose()
         }
         Owner::Edge(edge) => {
-            let label = snapshot.schema().label_id(&edge.label).map_err(Failure::input)?;
-            let key = dsr::EdgeKey { from: find(&edge.from)?, label, to: find(&edge.to)? };
+            let label = snapshot
+                .schema()
+                .label_id(&edge.label)
+                .map_err(Failure::input)?;
+            let key = dsr::EdgeKey {
+                from: find(&edge.from)?,
+                label,
+                to: find(&edge.to)?,
+            };
             let found = snapshot.find_edge(key).map_err(Failure::internal)?;
             found.map(|edge| edge.attribute(attribute)).transpose()
         }
@@ -229,7 +274,9 @@ fn get(source: &mut Source, path: &str, as_json: bool) -> Result<(), Failure> {
     if !as_json {
         return print(&format!("{value}\n"));
     }
-    let writer = snapshot.writer_name(attribute.writer).map_err(Failure::internal)?;
+    let writer = snapshot
+        .writer_name(attribute.writer)
+        .map_err(Failure::internal)?;
     print_json(&serde_json::json!({
         "value": value, "version": attribute.version.0, "time": attribute.time.seconds(),
         "writer": writer,
@@ -238,13 +285,22 @@ fn get(source: &mut Source, path: &str, as_json: bool) -> Result<(), Failure> {
 
 fn set(source: &GraphSource, path: &str, value: &str) -> Result<(), Failure> {
     if source.file.is_some() {
-        return Err(Failure::input("`graph set` changes a running system, not a file"));
+        return Err(Failure::input(
+            "`graph set` changes a running system, not a file",
+        ));
     }
     let mut session = attach(&source.instance)?;
     let snapshot = session.snapshot().map_err(Failure::internal)?;
     let (owner, name) = parse_path(path)?;
-    let attribute = snapshot.schema().attribute_id(&name).map_err(Failure::input)?;
-    let expected = snapshot.schema().attributes().get(usize::from(attribute.0)).and_then(|a| a.kind);
+    let attribute = snapshot
+        .schema()
+        .attribute_id(&name)
+        .map_err(Failure::input)?;
+    let expected = snapshot
+        .schema()
+        .attributes()
+        .get(usize::from(attribute.0))
+        .and_then(|a| a.kind);
     // A bare word is a string, so that a shell needs no quotes within quotes.
     let parsed = serde_json::from_str(value).unwrap_or_else(|_| value.into());
     let value = json::value_from_json(&parsed, expected).map_err(Failure::input)?;
@@ -264,7 +320,9 @@ fn filter(snapshot: &Snapshot, name: Option<&str>) -> Result<Filter, Failure> {
     filter.types.extend(schema.find_type(name));
     filter.labels.extend(schema.find_label(name));
     filter.attributes.extend(schema.find_attribute(name));
-    let node = snapshot.find_node_by_name(name).map_err(Failure::internal)?;
+    let node = snapshot
+        .find_node_by_name(name)
+        .map_err(Failure::internal)?;
     filter.nodes.extend(node.map(|node| node.id()));
     if filter == Filter::default() {
         return Err(no_such(snapshot, name, "type, label, attribute or node"));
@@ -274,7 +332,9 @@ fn filter(snapshot: &Snapshot, name: Option<&str>) -> Result<Filter, Failure> {
 
 fn watch(source: &GraphSource, name: Option<&str>, count: Option<u64>) -> Result<(), Failure> {
     if source.file.is_some() {
-        return Err(Failure::input("`graph watch` follows a running system, not a file"));
+        return Err(Failure::input(
+            "`graph watch` follows a running system, not a file",
+        ));
     }
     let interrupted = super::interruption()?;
     let mut session = attach(&source.instance)?;
@@ -288,7 +348,9 @@ fn watch(source: &GraphSource, name: Option<&str>, count: Option<u64>) -> Result
                 if !session.instance().exists() {
                     return Ok(());
                 }
-                changes.wait(Duration::from_millis(100)).map_err(Failure::internal)?;
+                changes
+                    .wait(Duration::from_millis(100))
+                    .map_err(Failure::internal)?;
             }
             Some(Update::Gap(version)) => {
                 print(&format!("(commits before version {version} were missed)\n"))?;
@@ -311,7 +373,11 @@ fn watch(source: &GraphSource, name: Option<&str>, count: Option<u64>) -> Result
 fn describe(snapshot: &Snapshot, change: &dsr::Change) -> String {
     let schema = snapshot.schema();
     let name = |id| {
-        let found = snapshot.find_node(id).ok().flatten().and_then(|node| node.name().ok());
+        let found = snapshot
+            .find_node(id)
+            .ok()
+            .flatten()
+            .and_then(|node| node.name().ok());
         found.unwrap_or_else(|| format!("node {id}"))
     };
     let sign = |touch| match touch {
@@ -321,25 +387,50 @@ fn describe(snapshot: &Snapshot, change: &dsr::Change) -> String {
     };
     let mut parts = Vec::new();
     for rule in &change.rules {
-        let binding = rule.binding.iter().map(|(var, id)| format!("{var}={}", name(*id)));
-        parts.push(format!("rule {}({})", rule.rule, binding.collect::<Vec<_>>().join(", ")));
+        let binding = rule
+            .binding
+            .iter()
+            .map(|(var, id)| format!("{var}={}", name(*id)));
+        parts.push(format!(
+            "rule {}({})",
+            rule.rule,
+            binding.collect::<Vec<_>>().join(", ")
+        ));
     }
     let attributes = |list: &[dsr::AttributeId]| {
         let names: Vec<&str> = list.iter().map(|&a| schema.attribute_name(a)).collect();
-        if names.is_empty() { String::new() } else { format!(".{{{}}}", names.join(",")) }
+        if names.is_empty() {
+            String::new()
+        } else {
+            format!(".{{{}}}", names.join(","))
+        }
     };
     for touched in &change.nodes {
         let attributes = attributes(&touched.attributes);
-        parts.push(format!("{}{}{attributes}", sign(touched.touch), name(touched.node)));
+        parts.push(format!(
+            "{}{}{attributes}",
+            sign(touched.touch),
+            name(touched.node)
+        ));
     }
     for touched in &change.edges {
         let key = touched.edge;
         let label = schema.label_name(key.label);
         let attributes = attributes(&touched.attributes);
         let sign = sign(touched.touch);
-        parts.push(format!("{sign}{} -{label}-> {}{attributes}", name(key.from), name(key.to)));
+        parts.push(format!(
+            "{sign}{} -{label}-> {}{attributes}",
+            name(key.from),
+            name(key.to)
+        ));
     }
-    format!("{} {:.3} s {}: {}", change.version, change.time.seconds(), change.agent, parts.join("; "))
+    format!(
+        "{} {:.3} s {}: {}",
+        change.version,
+        change.time.seconds(),
+        change.agent,
+        parts.join("; ")
+    )
 }
 
 fn export(source: &mut Source, format: &str) -> Result<(), Failure> {

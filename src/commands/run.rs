@@ -35,19 +35,35 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
         Tracks::load(tracks).map_err(|error| Failure::Input(error.into()))?;
     }
     let spaces = object_spaces(&scenario, &SocialConfig::default()).map_err(Failure::input)?;
-    let folder = arguments.report.clone().unwrap_or_else(|| Path::new("reports").join(&scenario.name));
+    let folder = arguments
+        .report
+        .clone()
+        .unwrap_or_else(|| Path::new("reports").join(&scenario.name));
     let interrupted = super::interruption()?;
-    let plan = Plan { arguments, scenario: &scenario, folder, interrupted: &interrupted };
+    let plan = Plan {
+        arguments,
+        scenario: &scenario,
+        folder,
+        interrupted: &interrupted,
+    };
     let social = !arguments.no_social;
-    let Some(recording) = plan.conduct(social, false)? else { return Ok(Answer::No) };
+    let Some(recording) = plan.conduct(social, false)? else {
+        return Ok(Answer::No);
+    };
     let baseline = if social && !arguments.no_baseline {
-        let Some(baseline) = plan.conduct(false, true)? else { return Ok(Answer::No) };
+        let Some(baseline) = plan.conduct(false, true)? else {
+            return Ok(Answer::No);
+        };
         Some(baseline)
     } else {
         None
     };
     plan.report(&recording, baseline.as_ref(), &spaces)?;
-    Ok(if recording.succeeded() { Answer::Yes } else { Answer::No })
+    Ok(if recording.succeeded() {
+        Answer::Yes
+    } else {
+        Answer::No
+    })
 }
 
 impl Plan<'_> {
@@ -58,7 +74,11 @@ impl Plan<'_> {
         let name = &arguments.instance.instance;
         let (instance, logs, title) = if baseline {
             let title = format!("{} without social behaviour", self.scenario.name);
-            (super::instance(&format!("{name}-baseline"))?, "logs-baseline", title)
+            (
+                super::instance(&format!("{name}-baseline"))?,
+                "logs-baseline",
+                title,
+            )
         } else {
             (super::instance(name)?, "logs", self.scenario.name.clone())
         };
@@ -105,7 +125,11 @@ impl Plan<'_> {
             mission,
             metrics,
             plan: recording.steps.iter().filter_map(step).collect(),
-            replans: recording.missions.iter().map(|mission| mission.replans).sum(),
+            replans: recording
+                .missions
+                .iter()
+                .map(|mission| mission.replans)
+                .sum(),
             agents: recording
                 .accounts
                 .iter()
@@ -115,8 +139,10 @@ impl Plan<'_> {
                     cpu_seconds: (!arguments.lockstep).then_some(account.cpu_seconds),
                 })
                 .collect(),
-            baseline: other
-                .map(|(other, metrics)| Baseline { success: other.succeeded(), metrics }),
+            baseline: other.map(|(other, metrics)| Baseline {
+                success: other.succeeded(),
+                metrics,
+            }),
         };
         let json = report.to_json().map_err(Failure::internal)?;
         write(&self.folder.join("report.json"), json.as_bytes())?;
@@ -127,7 +153,10 @@ impl Plan<'_> {
             return output::print(&json);
         }
         let folder = self.folder.display();
-        output::print(&format!("{}\nreport.json, map.svg and map.png are in {folder}\n", report.table()))
+        output::print(&format!(
+            "{}\nreport.json, map.svg and map.png are in {folder}\n",
+            report.table()
+        ))
     }
 
     fn picture(
@@ -145,9 +174,22 @@ impl Plan<'_> {
             metrics,
         });
         let success = recording.succeeded();
-        let run = Run { social, success, samples: &recording.truths, metrics };
+        let run = Run {
+            social,
+            success,
+            samples: &recording.truths,
+            metrics,
+        };
         let seed = self.arguments.seed;
-        Picture { scenario: self.scenario, spaces, seed, run, baseline, at: None }.svg()
+        Picture {
+            scenario: self.scenario,
+            spaces,
+            seed,
+            run,
+            baseline,
+            at: None,
+        }
+        .svg()
     }
 }
 

@@ -26,14 +26,22 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
         None => {
             let mut initial = scenarios::initial_graph(&scenario);
             initial.set(scenarios::WORLD, "social", !arguments.no_social);
-            store.commit(&initial, scenario.start).map_err(Failure::internal)?;
+            store
+                .commit(&initial, scenario.start)
+                .map_err(Failure::internal)?;
         }
     }
-    let pace = if arguments.supervised { Pace::Free } else { Pace::Alone };
+    let pace = if arguments.supervised {
+        Pace::Free
+    } else {
+        Pace::Alone
+    };
     let mut lifeline = Turns::begin(pace, interrupted).map_err(Failure::internal)?;
     let mut round = 0u32;
     while !lifeline.ended() {
-        store.serve(Duration::from_millis(25)).map_err(Failure::internal)?;
+        store
+            .serve(Duration::from_millis(25))
+            .map_err(Failure::internal)?;
         round = round.wrapping_add(1);
         if round.is_multiple_of(CLEANING) {
             store.clean_up_after_the_dead();

@@ -56,27 +56,37 @@ impl Child {
             .spawn()?;
         let lifeline = process.stdin.take();
         if let Some(output) = process.stdout.take() {
-            std::thread::Builder::new().name(format!("hear-{member}")).spawn(move || {
-                let tell = |kind| send.send(Event { member, generation, kind });
-                for line in BufReader::new(output).lines() {
-                    let Ok(line) = line else { break };
-                    if tell(EventKind::Line(line)).is_err() {
-                        return;
+            std::thread::Builder::new()
+                .name(format!("hear-{member}"))
+                .spawn(move || {
+                    let tell = |kind| {
+                        send.send(Event {
+                            member,
+                            generation,
+                            kind,
+                        })
+                    };
+                    for line in BufReader::new(output).lines() {
+                        let Ok(line) = line else { break };
+                        if tell(EventKind::Line(line)).is_err() {
+                            return;
+                        }
                     }
-                }
-                // Nobody listens any more when the supervisor has ended.
-                drop(tell(EventKind::Ended));
-            })?;
+                    // Nobody listens any more when the supervisor has ended.
+                    drop(tell(EventKind::Ended));
+                })?;
         }
-        Ok(Self { process, lifeline, generation, last_line: String::new(), cpu: 0.0 })
+        Ok(Self {
+            process,
+            lifeline,
+            generation,
+            last_line: String::new(),
+            cpu: 0.0,
+        })
     }
 
     pub(crate) fn generation(&self) -> u64 {
         self.generation
-    }
-
-    pub(crate) fn id(&self) -> u32 {
-        self.process.id()
     }
 
     pub(crate) fn said(&mut self, line: String) {
@@ -96,7 +106,9 @@ impl Child {
 
     /// CPU seconds so far.
     pub(crate) fn cpu_seconds(&self) -> f64 {
-        cpu_seconds(self.process.id()).unwrap_or(self.cpu).max(self.cpu)
+        cpu_seconds(self.process.id())
+            .unwrap_or(self.cpu)
+            .max(self.cpu)
     }
 
     pub(crate) fn note_cpu(&mut self) {
@@ -120,7 +132,10 @@ impl Child {
         self.cpu
     }
 
-    #[allow(clippy::disallowed_methods, reason = "a child's end cannot be waited for with a time limit otherwise")]
+    #[allow(
+        clippy::disallowed_methods,
+        reason = "a child's end cannot be waited for with a time limit otherwise"
+    )]
     fn wait_or_kill(&mut self, patience: Duration) {
         let deadline = super::now() + patience;
         while matches!(self.process.try_wait(), Ok(None)) {

@@ -22,13 +22,24 @@ const RESTART_WINDOW: Duration = Duration::from_secs(10);
 #[derive(Debug, Error)]
 pub(crate) enum SuperviseError {
     #[error("cannot start {process}: {source}")]
-    Start { process: String, source: std::io::Error },
+    Start {
+        process: String,
+        source: std::io::Error,
+    },
     #[error("{process} ended ({status}) and cannot be restarted; {log}")]
-    Ended { process: String, status: String, log: String },
+    Ended {
+        process: String,
+        status: String,
+        log: String,
+    },
     #[error("{process} ended {RESTARTS} times within {} s; {log}", RESTART_WINDOW.as_secs())]
     KeepsEnding { process: String, log: String },
     #[error("{process} did not {what} within {} s; {log}", PATIENCE.as_secs())]
-    Silent { process: String, what: &'static str, log: String },
+    Silent {
+        process: String,
+        what: &'static str,
+        log: String,
+    },
     #[error("cannot restart the store: {0}")]
     Store(String),
     #[error("interrupted")]
@@ -84,7 +95,10 @@ pub(crate) struct Supervisor {
     generation: u64,
 }
 
-#[allow(clippy::disallowed_methods, reason = "the supervisor owns the clock of its processes")]
+#[allow(
+    clippy::disallowed_methods,
+    reason = "the supervisor owns the clock of its processes"
+)]
 pub(crate) fn now() -> Instant {
     Instant::now()
 }
@@ -94,14 +108,26 @@ impl Supervisor {
     pub(crate) fn new(executable: PathBuf, logs: &Path) -> Self {
         let (send, events) = channel();
         let logs = logs.to_owned();
-        Self { executable, logs, members: Vec::new(), events, send, generation: 0 }
+        Self {
+            executable,
+            logs,
+            members: Vec::new(),
+            events,
+            send,
+            generation: 0,
+        }
     }
 
     /// Starts a process; does not wait for it to join.
     pub(crate) fn start(&mut self, program: Program) -> Result<usize, SuperviseError> {
         let index = self.members.len();
-        let member =
-            Member { program, child: None, restarts: Vec::new(), ready: false, spent: 0.0 };
+        let member = Member {
+            program,
+            child: None,
+            restarts: Vec::new(),
+            ready: false,
+            spent: 0.0,
+        };
         self.members.push(member);
         self.spawn(index, &[])?;
         Ok(index)
@@ -111,20 +137,35 @@ impl Supervisor {
         self.generation += 1;
         let member = &mut self.members[index];
         let log = self.logs.join(format!("{}.log", member.program.name));
-        let arguments: Vec<OsString> = member.program.arguments.iter().chain(extra).cloned().collect();
+        let arguments: Vec<OsString> = member
+            .program
+            .arguments
+            .iter()
+            .chain(extra)
+            .cloned()
+            .collect();
         member.ready = false;
         let send = self.send.clone();
-        let child = Child::spawn(&self.executable, &arguments, &log, index, self.generation, send)
-            .map_err(|source| {
-                let process = member.program.name.clone();
-                SuperviseError::Start { process, source }
-            })?;
+        let child = Child::spawn(
+            &self.executable,
+            &arguments,
+            &log,
+            index,
+            self.generation,
+            send,
+        )
+        .map_err(|source| {
+            let process = member.program.name.clone();
+            SuperviseError::Start { process, source }
+        })?;
         member.child = Some(child);
         Ok(())
     }
 
     fn log_hint(&self, index: usize) -> String {
-        let log = self.logs.join(format!("{}.log", self.members[index].program.name));
+        let log = self
+            .logs
+            .join(format!("{}.log", self.members[index].program.name));
         let text = std::fs::read_to_string(&log).unwrap_or_default();
         let last: Vec<&str> = text.lines().rev().take(3).collect();
         let last: Vec<&str> = last.into_iter().rev().collect();
@@ -139,7 +180,9 @@ impl Supervisor {
         notices: &mut Vec<Notice>,
         interrupted: &dyn Fn() -> bool,
     ) -> Result<(), SuperviseError> {
-        self.wait(index, "join", rescue, notices, interrupted, |member| member.ready)
+        self.wait(index, "join", rescue, notices, interrupted, |member| {
+            member.ready
+        })
     }
 
     fn wait(
@@ -158,7 +201,11 @@ impl Supervisor {
             }
             if now() > deadline {
                 let process = self.members[index].program.name.clone();
-                return Err(SuperviseError::Silent { process, what, log: self.log_hint(index) });
+                return Err(SuperviseError::Silent {
+                    process,
+                    what,
+                    log: self.log_hint(index),
+                });
             }
             self.hear(Duration::from_millis(50), rescue, notices)?;
         }
@@ -185,7 +232,11 @@ impl Supervisor {
         notices: &mut Vec<Notice>,
     ) -> Result<(), SuperviseError> {
         let member = &mut self.members[event.member];
-        let Some(child) = member.child.as_mut().filter(|c| c.generation() == event.generation) else {
+        let Some(child) = member
+            .child
+            .as_mut()
+            .filter(|c| c.generation() == event.generation)
+        else {
             return Ok(());
         };
         match event.kind {
@@ -218,7 +269,11 @@ impl Supervisor {
         let member = &mut self.members[index];
         let process = member.program.name.clone();
         if member.program.policy == Policy::EndRun {
-            return Err(SuperviseError::Ended { process, status, log });
+            return Err(SuperviseError::Ended {
+                process,
+                status,
+                log,
+            });
         }
         member.restarts.push(now());
         let recent = member.restarts.iter().rev().take(RESTARTS);
@@ -226,8 +281,14 @@ impl Supervisor {
             return Err(SuperviseError::KeepsEnding { process, log });
         }
         let with_graph = member.program.policy == Policy::RestartWithGraph;
-        notices.push(Notice(format!("{process} ended ({status}) and is restarted")));
-        let extra = if with_graph { rescue().map_err(SuperviseError::Store)? } else { Vec::new() };
+        notices.push(Notice(format!(
+            "{process} ended ({status}) and is restarted"
+        )));
+        let extra = if with_graph {
+            rescue().map_err(SuperviseError::Store)?
+        } else {
+            Vec::new()
+        };
         self.spawn(index, &extra)
     }
 
@@ -249,10 +310,20 @@ impl Supervisor {
             if let Some(child) = &mut self.members[index].child {
                 child.give_turn(tick);
             }
-            self.wait(index, "take its turn", rescue, notices, interrupted, |member| {
-                member.restarts.len() > lives
-                    || member.child.as_ref().is_some_and(|child| child.has_said(done))
-            })?;
+            self.wait(
+                index,
+                "take its turn",
+                rescue,
+                notices,
+                interrupted,
+                |member| {
+                    member.restarts.len() > lives
+                        || member
+                            .child
+                            .as_ref()
+                            .is_some_and(|child| child.has_said(done))
+                },
+            )?;
             if self.members[index].restarts.len() == lives {
                 return Ok(());
             }
@@ -269,11 +340,6 @@ impl Supervisor {
     /// The process's name.
     pub(crate) fn name(&self, index: usize) -> &str {
         &self.members[index].program.name
-    }
-
-    /// Its process id, while it runs.
-    pub(crate) fn process_id(&self, index: usize) -> Option<u32> {
-        self.members[index].child.as_ref().map(Child::id)
     }
 
     /// Notes the CPU time of running processes, so that one that is killed does not lose it.
@@ -332,7 +398,11 @@ impl Hold {
             )
         })?;
         instance.remove().into_diagnostic()?;
-        Ok(Self { instance: instance.clone(), path, _lock: lock })
+        Ok(Self {
+            instance: instance.clone(),
+            path,
+            _lock: lock,
+        })
     }
 }
 

@@ -3,6 +3,7 @@
 
 use crate::support::{Program, Run};
 use serde_json::Value;
+use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
@@ -22,11 +23,19 @@ fn zones(psi: &Value) -> [f64; 4] {
 #[test]
 fn the_same_seed_gives_the_same_report_byte_for_byte() {
     let reports = [(); 2].map(|()| {
-        let run = Run::new("lockstep", &[CARE_CENTRE, "--lockstep", "--seed", "3", "--no-baseline"]);
+        let run = Run::new(
+            "lockstep",
+            &[CARE_CENTRE, "--lockstep", "--seed", "3", "--no-baseline"],
+        );
         let folder = run.succeed();
         report(folder.path()).0
     });
-    assert!(reports[0] == reports[1], "the reports differ:\n{}\n{}", reports[0], reports[1]);
+    assert!(
+        reports[0] == reports[1],
+        "the reports differ:\n{}\n{}",
+        reports[0],
+        reports[1]
+    );
 }
 
 #[test]
@@ -36,21 +45,44 @@ fn the_care_centre_is_crossed_and_reported_beside_the_run_without_social_behavio
     let (_, report) = report(folder.path());
     assert_eq!(report["scenario"], "care-centre");
     assert_eq!(report["success"], true);
-    for psi in [&report["psi"], &report["psi_moving"], &report["baseline"]["psi"]] {
+    for psi in [
+        &report["psi"],
+        &report["psi_moving"],
+        &report["baseline"]["psi"],
+    ] {
         let sum: f64 = zones(psi).iter().sum();
         assert!((sum - 100.0).abs() < 1e-6, "{psi}");
     }
     let close = |psi: &Value| zones(psi)[0] + zones(psi)[1];
     let (with, without) = (close(&report["psi"]), close(&report["baseline"]["psi"]));
-    assert!(with < without, "in people's space {with} % of the time with, {without} % without");
+    assert!(
+        with < without,
+        "in people's space {with} % of the time with, {without} % without"
+    );
     assert!(report["robot"]["path_length"].as_f64().unwrap() > 10.0);
     assert_eq!(report["robot"]["collisions"], 0);
-    let rules: Vec<&str> =
-        report["plan"].as_array().unwrap().iter().map(|s| s["rule"].as_str().unwrap()).collect();
-    assert!(rules.contains(&"changeRoom") && rules.contains(&"takeTheAttention"), "{rules:?}");
-    assert!(report["agents"].as_array().unwrap().iter().all(|a| a["cpu_seconds"].is_null()));
+    let rules: Vec<&str> = report["plan"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|s| s["rule"].as_str().unwrap())
+        .collect();
+    assert!(
+        rules.contains(&"changeRoom") && rules.contains(&"takeTheAttention"),
+        "{rules:?}"
+    );
+    assert!(
+        report["agents"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .all(|a| a["cpu_seconds"].is_null())
+    );
     for picture in ["map.svg", "map.png"] {
-        assert!(fs::metadata(folder.path().join(picture)).unwrap().len() > 10_000, "{picture}");
+        assert!(
+            fs::metadata(folder.path().join(picture)).unwrap().len() > 10_000,
+            "{picture}"
+        );
     }
 }
 
@@ -60,9 +92,13 @@ fn recording() -> String {
     for step in 0..200 {
         let (frame, t) = (1 + 10 * step, f64::from(step) * 0.4);
         for (id, y, speed) in [(1, 4.0, 1.2), (2, 8.0, -1.0)] {
-            let (x, v) = if t * f64::abs(speed) < 14.0 { (t * speed, speed) } else { continue };
+            let (x, v) = if t * f64::abs(speed) < 14.0 {
+                (t * speed, speed)
+            } else {
+                continue;
+            };
             let x = if speed > 0.0 { 0.5 + x } else { 14.5 + x };
-            text.push_str(&format!("{frame} {id} {x} 0 {y} {v} 0 0\n"));
+            let _ = writeln!(text, "{frame} {id} {x} 0 {y} {v} 0 0");
         }
     }
     text
@@ -74,7 +110,10 @@ fn recorded_pedestrians_take_the_place_of_simulated_ones() {
     let tracks = folder.path().join("obsmat.txt");
     fs::write(&tracks, recording()).unwrap();
     let tracks = tracks.to_str().unwrap();
-    let run = Run::new("tracks", &[PLAZA, "--lockstep", "--tracks", tracks, "--no-baseline"]);
+    let run = Run::new(
+        "tracks",
+        &[PLAZA, "--lockstep", "--tracks", tracks, "--no-baseline"],
+    );
     let folder = run.succeed();
     let (_, report) = report(folder.path());
     assert_eq!(report["success"], true);
@@ -116,7 +155,10 @@ fn a_supervisor_that_is_killed_takes_its_processes_with_it_and_the_next_run_clea
     run.until("mission invite is running");
     run.kill_supervisor();
     run.wait_until_no_process_is_left();
-    let again = Run::on(run.instance_name(), &[CARE_CENTRE, "--lockstep", "--no-baseline"]);
+    let again = Run::on(
+        run.instance_name(),
+        &[CARE_CENTRE, "--lockstep", "--no-baseline"],
+    );
     again.succeed();
     run.assert_nothing_is_left();
 }
@@ -129,19 +171,37 @@ fn the_live_graph_is_shown_from_another_terminal() {
     let shown = Program::run(&["graph", "show", "robot", "--instance", &name]);
     assert!(shown.status.success(), "{shown:?}");
     let text = String::from_utf8(shown.stdout).unwrap();
-    assert!(text.contains("robot : robot") && text.contains("-in-> "), "{text}");
-    let set = Program::run(&["graph", "set", "robot.max_speed", "0.33", "--instance", &name]);
+    assert!(
+        text.contains("robot : robot") && text.contains("-in-> "),
+        "{text}"
+    );
+    let set = Program::run(&[
+        "graph",
+        "set",
+        "robot.max_speed",
+        "0.33",
+        "--instance",
+        &name,
+    ]);
     assert!(set.status.success(), "{set:?}");
     let got = Program::run(&["graph", "get", "robot.max_speed", "--instance", &name]);
     assert_eq!(String::from_utf8(got.stdout).unwrap(), "0.33\n");
     let wrong = Program::run(&["graph", "get", "robto.max_speed", "--instance", &name]);
     assert_eq!(wrong.status.code(), Some(2));
-    assert!(String::from_utf8(wrong.stderr).unwrap().contains("did you mean `robot`?"));
+    assert!(
+        String::from_utf8(wrong.stderr)
+            .unwrap()
+            .contains("did you mean `robot`?")
+    );
     let json = Program::run(&["graph", "export", "json", "--instance", &name]);
     let json: Value = serde_json::from_slice(&json.stdout).unwrap();
     assert_eq!(json["format"], "dsr/1");
     let twice = Program::run(&["run", CARE_CENTRE, "--instance", &name]);
-    assert!(String::from_utf8(twice.stderr).unwrap().contains("is running already"));
+    assert!(
+        String::from_utf8(twice.stderr)
+            .unwrap()
+            .contains("is running already")
+    );
     run.interrupt();
     assert_eq!(run.exit_code(), 1);
 }
@@ -154,9 +214,14 @@ fn a_broken_scenario_is_told_with_line_and_column() {
         fs::write(folder.path().join(file), text).unwrap();
     }
     fs::create_dir(folder.path().join("missions")).unwrap();
-    for mission in fs::read_dir(crate::support::root().join(CARE_CENTRE).join("missions")).unwrap() {
+    for mission in fs::read_dir(crate::support::root().join(CARE_CENTRE).join("missions")).unwrap()
+    {
         let mission = mission.unwrap();
-        fs::copy(mission.path(), folder.path().join("missions").join(mission.file_name())).unwrap();
+        fs::copy(
+            mission.path(),
+            folder.path().join("missions").join(mission.file_name()),
+        )
+        .unwrap();
     }
     let path = folder.path().join("scenario.toml");
     let good = fs::read_to_string(&path).unwrap();
@@ -169,9 +234,16 @@ fn a_broken_scenario_is_told_with_line_and_column() {
     fs::write(&path, good).unwrap();
     let rules = folder.path().join("rules.aggl");
     let text = fs::read_to_string(&rules).unwrap();
-    fs::write(&rules, text.replacen("robot->room1(in)", "robto->room1(in)", 1)).unwrap();
+    fs::write(
+        &rules,
+        text.replacen("robot->room1(in)", "robto->room1(in)", 1),
+    )
+    .unwrap();
     let run = Program::run(&["run", folder.path().to_str().unwrap()]);
     assert_eq!(run.status.code(), Some(2));
     let told = String::from_utf8(run.stderr).unwrap();
-    assert!(told.contains("rules.aggl:") && told.contains("robot"), "{told}");
+    assert!(
+        told.contains("rules.aggl:") && told.contains("robot"),
+        "{told}"
+    );
 }

@@ -3,6 +3,7 @@
 
 use super::{TestInstance, root};
 use rustix::process::{Pid, Signal, kill_process};
+use std::fmt::Write as _;
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, ChildStderr, Command, ExitStatus, Output, Stdio};
@@ -14,7 +15,10 @@ pub(crate) struct Program;
 impl Program {
     pub(crate) fn command(arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_cortex-under-test"));
-        command.args(arguments).current_dir(root()).stdin(Stdio::null());
+        command
+            .args(arguments)
+            .current_dir(root())
+            .stdin(Stdio::null());
         command
     }
 
@@ -32,13 +36,19 @@ pub(crate) struct Run {
 impl Run {
     pub(crate) fn new(test: &str, arguments: &[&str]) -> Self {
         let arguments = arguments.iter().map(|&a| a.to_owned()).collect();
-        Self { instance: TestInstance::new(test), arguments }
+        Self {
+            instance: TestInstance::new(test),
+            arguments,
+        }
     }
 
     /// As [`Self::new`], in an instance that another run of this test used.
     pub(crate) fn on(instance: &str, arguments: &[&str]) -> Self {
         let arguments = arguments.iter().map(|&a| a.to_owned()).collect();
-        Self { instance: TestInstance::named(instance), arguments }
+        Self {
+            instance: TestInstance::named(instance),
+            arguments,
+        }
     }
 
     pub(crate) fn start(self) -> Started {
@@ -53,7 +63,13 @@ impl Run {
             .spawn()
             .unwrap();
         let said = BufReader::new(child.stderr.take().unwrap());
-        Started { child, said, heard: String::new(), folder, instance: self.instance }
+        Started {
+            child,
+            said,
+            heard: String::new(),
+            folder,
+            instance: self.instance,
+        }
     }
 
     /// Runs it to its end, which must be a success; its report's folder.
@@ -93,11 +109,14 @@ impl Started {
 
     fn logs(&self) -> String {
         let mut logs = String::new();
-        for log in fs::read_dir(self.folder.path().join("logs")).into_iter().flatten() {
+        for log in fs::read_dir(self.folder.path().join("logs"))
+            .into_iter()
+            .flatten()
+        {
             let path = log.unwrap().path();
             let text = fs::read_to_string(&path).unwrap();
             let from = text.char_indices().rev().nth(2000).map_or(0, |(at, _)| at);
-            logs.push_str(&format!("--- {}\n{}", path.display(), &text[from..]));
+            let _ = write!(logs, "--- {}\n{}", path.display(), &text[from..]);
         }
         logs
     }
@@ -136,12 +155,19 @@ impl Started {
 
     pub(crate) fn exit_code(&mut self) -> i32 {
         let status = self.wait();
-        status.code().unwrap_or_else(|| panic!("{status}: {}", self.heard))
+        status
+            .code()
+            .unwrap_or_else(|| panic!("{status}: {}", self.heard))
     }
 
     pub(crate) fn succeed(mut self) -> TempDir {
         let status = self.wait();
-        assert!(status.success(), "{status}: {}\n{}", self.heard, self.logs());
+        assert!(
+            status.success(),
+            "{status}: {}\n{}",
+            self.heard,
+            self.logs()
+        );
         self.assert_nothing_is_left();
         std::mem::replace(&mut self.folder, tempfile::tempdir().unwrap())
     }
@@ -181,7 +207,7 @@ impl Drop for Started {
 fn signal(id: u32, signal: Signal) {
     if let Some(process) = Pid::from_raw(id.cast_signed()) {
         // It may have ended already, which is as good.
-        drop(kill_process(process, signal));
+        let _ = kill_process(process, signal);
     }
 }
 
@@ -190,12 +216,18 @@ fn processes_of(instance: &str) -> Vec<(u32, String)> {
     let mut found = Vec::new();
     for entry in fs::read_dir("/proc").unwrap() {
         let name = entry.unwrap().file_name();
-        let Some(id) = name.to_str().and_then(|name| name.parse::<u32>().ok()) else { continue };
+        let Some(id) = name.to_str().and_then(|name| name.parse::<u32>().ok()) else {
+            continue;
+        };
         // A process that ends meanwhile has no command line any more.
         let line = fs::read(format!("/proc/{id}/cmdline")).unwrap_or_default();
-        let words: Vec<String> =
-            line.split(|&b| b == 0).map(|w| String::from_utf8_lossy(w).into_owned()).collect();
-        let named = words.windows(2).any(|w| w[0] == "--instance" && w[1] == instance);
+        let words: Vec<String> = line
+            .split(|&b| b == 0)
+            .map(|w| String::from_utf8_lossy(w).into_owned())
+            .collect();
+        let named = words
+            .windows(2)
+            .any(|w| w[0] == "--instance" && w[1] == instance);
         if named && id != std::process::id() {
             found.push((id, words.join(" ")));
         }
