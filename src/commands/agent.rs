@@ -75,7 +75,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
             run(session, begin()?).map_err(Failure::internal)
         }
     };
-    outcome.map(|()| Answer::Yes)
+    outcome?;
+    if pace == Pace::Alone {
+        instance.remove_if_unused().map_err(Failure::internal)?;
+    }
+    Ok(Answer::Yes)
 }
 
 fn attach(instance: &dsr::Instance, name: &str) -> Result<Session, Failure> {

@@ -47,5 +47,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
             store.clean_up_after_the_dead();
         }
     }
+    drop(store);
+    if pace == Pace::Alone {
+        instance.remove_if_unused().map_err(Failure::internal)?;
+    }
     Ok(Answer::Yes)
 }

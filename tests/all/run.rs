@@ -247,3 +247,43 @@ fn a_broken_scenario_is_told_with_line_and_column() {
         "{told}"
     );
 }
+
+#[test]
+fn a_system_started_by_hand_works_and_the_last_process_out_removes_it() {
+    let instance = crate::support::TestInstance::new("by-hand");
+    let name = instance.name();
+    let start = |arguments: &[&str]| {
+        let mut command = Program::command(arguments);
+        command
+            .args(["--instance", name])
+            .stderr(std::process::Stdio::null());
+        command.spawn().unwrap()
+    };
+    let mut store = start(&["store", "--scenario", PLAZA]);
+    let mut observer = start(&["agent", "human_observer"]);
+    let mut world = start(&["agent", "world", "--scenario", PLAZA, "--speed", "5"]);
+    let patience = std::time::Duration::from_secs(20);
+    let mut session = dsr::Session::attach(&instance.0, "test", patience).unwrap();
+    let mut changes = session.changes(dsr::Filter::default()).unwrap();
+    let seen = loop {
+        let snapshot = session.snapshot().unwrap();
+        let person = snapshot.schema().type_id("person").unwrap();
+        let seen = snapshot.count_of_type(person).unwrap();
+        if seen > 0 {
+            break seen;
+        }
+        changes.wait(patience).unwrap();
+        while changes.next(snapshot.schema()).unwrap().is_some() {}
+    };
+    assert!(seen > 0);
+    drop((changes, session));
+    for child in [&mut world, &mut observer, &mut store] {
+        crate::support::interrupt(child.id());
+        assert!(child.wait().unwrap().success());
+    }
+    assert_eq!(
+        instance.0.shared_memory().unwrap(),
+        Vec::<std::path::PathBuf>::new()
+    );
+    assert!(!instance.0.folder().exists());
+}

@@ -18,8 +18,8 @@ pub use store::{Store, StoreError};
 
 use iceoryx2::config::Config;
 use iceoryx2::prelude::{
-    FileName, LogLevel, NodeBuilder, Path as IpcPath, SemanticString, ServiceName,
-    SignalHandlingMode, ipc_threadsafe, set_log_level,
+    CallbackProgression, FileName, LogLevel, NodeBuilder, NodeState, Path as IpcPath,
+    SemanticString, ServiceName, SignalHandlingMode, ipc_threadsafe, set_log_level,
 };
 use std::fs;
 use std::io;
@@ -166,6 +166,21 @@ impl Instance {
             }),
             _ => Ok(()),
         }
+    }
+
+    /// Removes the instance if none of its processes runs: for a process that was started by hand
+    /// and ends, and may be the last.
+    ///
+    /// # Errors
+    /// [`InstanceError`].
+    pub fn remove_if_unused(&self) -> Result<(), InstanceError> {
+        let mut running = 0;
+        IpcNode::list(&self.config()?, |state| {
+            running += u32::from(matches!(state, NodeState::Alive(_)));
+            CallbackProgression::Continue
+        })
+        .map_err(|e| ipc("listing the instance's processes", e))?;
+        if running == 0 { self.remove() } else { Ok(()) }
     }
 
     /// The instance's files in shared memory.
