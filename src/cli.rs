@@ -29,6 +29,9 @@ pub(crate) enum Verb {
     /// Look at and change the shared graph of a running instance, or a graph file
     #[command(after_help = "Example:\n  cortex graph show --instance default")]
     Graph(Graph),
+    /// Check, list, format and try the rules of a grammar file (.aggl)
+    #[command(after_help = "Example:\n  cortex rules check scenarios/care-centre/rules.aggl")]
+    Rules(Rules),
 }
 
 /// Which running system.
@@ -195,4 +198,80 @@ pub(crate) enum GraphAction {
         #[arg(value_parser = ["json", "dot"])]
         format: String,
     },
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Rules {
+    #[command(subcommand)]
+    pub(crate) action: RulesAction,
+    /// For machines
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Clone, Subcommand)]
+pub(crate) enum RulesAction {
+    /// Tell everything that is wrong with a grammar and its includes, and where
+    #[command(after_help = "Example:\n  cortex rules check scenarios/care-centre/rules.aggl")]
+    Check {
+        /// A grammar (.aggl)
+        file: PathBuf,
+    },
+    /// List types and rules, also those of a file in which others are broken
+    #[command(after_help = "Example:\n  cortex rules list scenarios/care-centre/rules.aggl --json")]
+    List {
+        /// A grammar (.aggl)
+        file: PathBuf,
+    },
+    /// Print a grammar in canonical form
+    #[command(after_help = "Example:\n  cortex rules fmt rules.aggl > tidy.aggl")]
+    Fmt {
+        /// A grammar (.aggl)
+        file: PathBuf,
+    },
+    /// Find where the left-hand side of rules holds in a world
+    #[command(
+        after_help = "Example:\n  cortex rules match rules.aggl --rule changeRoom --world world.json"
+    )]
+    Match {
+        /// A grammar (.aggl)
+        file: PathBuf,
+        /// Only this rule [default: every rule]
+        #[arg(long, value_name = "R")]
+        rule: Option<String>,
+        /// A world: graph JSON, RoboComp DSR JSON or AGM model XML
+        #[arg(long, value_name = "W")]
+        world: PathBuf,
+        /// Count the matches without listing them
+        #[arg(long)]
+        count: bool,
+    },
+    /// Show what applying a rule to a world would change; the file stays as it is
+    #[command(
+        after_help = "Example:\n  cortex rules apply rules.aggl --rule changeRoom \
+        --world world.json --bind room2=kitchen"
+    )]
+    Apply {
+        /// A grammar (.aggl)
+        file: PathBuf,
+        /// The rule
+        #[arg(long, value_name = "R")]
+        rule: String,
+        /// A world: graph JSON, RoboComp DSR JSON or AGM model XML
+        #[arg(long, value_name = "W")]
+        world: PathBuf,
+        /// The node, by name or id, that a variable of the rule stands for; as many as it takes to
+        /// leave one match
+        #[arg(long, value_name = "VAR=NODE", num_args = 1.., value_parser = binding)]
+        bind: Vec<(String, String)>,
+    },
+}
+
+fn binding(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((variable, node)) if !variable.is_empty() && !node.is_empty() => {
+            Ok((variable.to_owned(), node.to_owned()))
+        }
+        _ => Err("write VARIABLE=NODE".to_owned()),
+    }
 }
