@@ -32,6 +32,12 @@ pub(crate) enum Verb {
     /// Check, list, format and try the rules of a grammar file (.aggl)
     #[command(after_help = "Example:\n  cortex rules check scenarios/care-centre/rules.aggl")]
     Rules(Rules),
+    /// Find the steps that lead from a world to a goal
+    #[command(
+        after_help = "Without --optimal and --time-limit it prints the first plan it finds.\n\n\
+        Example:\n  cortex plan rules.aggl world.json goal.aggt --optimal"
+    )]
+    Plan(Plan),
 }
 
 /// Which running system.
@@ -273,5 +279,36 @@ fn binding(text: &str) -> Result<(String, String), String> {
             Ok((variable.to_owned(), node.to_owned()))
         }
         _ => Err("write VARIABLE=NODE".to_owned()),
+    }
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Plan {
+    /// A grammar (.aggl)
+    pub(crate) domain: PathBuf,
+    /// A world: graph JSON, RoboComp DSR JSON or AGM model XML
+    pub(crate) world: PathBuf,
+    /// A goal (.aggt)
+    pub(crate) goal: PathBuf,
+    /// A plan of least cost, or the proof that there is none
+    #[arg(long)]
+    pub(crate) optimal: bool,
+    /// Stop after so many seconds; without --optimal, look for better plans until then
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub(crate) time_limit: Option<f64>,
+    /// Stop before the search takes more memory than this
+    #[arg(long, value_name = "MB", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) memory_limit: u32,
+    /// For machines
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let seconds: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    if seconds.is_finite() && seconds > 0.0 {
+        Ok(seconds)
+    } else {
+        Err("the time must be more than 0 seconds".to_owned())
     }
 }

@@ -3,6 +3,7 @@
 mod agent;
 mod graph;
 mod output;
+mod plan;
 mod rules;
 mod run;
 mod store;
@@ -26,6 +27,7 @@ pub(crate) fn perform(verb: Verb) -> Result<Answer, Failure> {
         Verb::Store(arguments) => store::run(&arguments),
         Verb::Graph(arguments) => graph::run(&arguments),
         Verb::Rules(arguments) => rules::run(&arguments),
+        Verb::Plan(arguments) => plan::run(&arguments),
     }
 }
 
