@@ -29,6 +29,15 @@ pub(crate) enum Verb {
     /// Look at and change the shared graph of a running instance, or a graph file
     #[command(after_help = "Example:\n  cortex graph show --instance default")]
     Graph(Graph),
+    /// Check, list, format and try the rules of a grammar file (.aggl)
+    #[command(after_help = "Example:\n  cortex rules check scenarios/care-centre/rules.aggl")]
+    Rules(Rules),
+    /// Find the steps that lead from a world to a goal
+    #[command(
+        after_help = "Without --optimal and --time-limit it prints the first plan it finds.\n\n\
+        Example:\n  cortex plan rules.aggl world.json goal.aggt --optimal"
+    )]
+    Plan(Plan),
 }
 
 /// Which running system.
@@ -195,4 +204,111 @@ pub(crate) enum GraphAction {
         #[arg(value_parser = ["json", "dot"])]
         format: String,
     },
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Rules {
+    #[command(subcommand)]
+    pub(crate) action: RulesAction,
+    /// For machines
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Clone, Subcommand)]
+pub(crate) enum RulesAction {
+    /// Tell everything that is wrong with a grammar and its includes, and where
+    #[command(after_help = "Example:\n  cortex rules check scenarios/care-centre/rules.aggl")]
+    Check {
+        /// A grammar (.aggl)
+        file: PathBuf,
+    },
+    /// List types and rules, also those of a file in which others are broken
+    #[command(after_help = "Example:\n  cortex rules list scenarios/care-centre/rules.aggl --json")]
+    List {
+        /// A grammar (.aggl)
+        file: PathBuf,
+    },
+    /// Print a grammar in canonical form
+    #[command(after_help = "Example:\n  cortex rules fmt rules.aggl > tidy.aggl")]
+    Fmt {
+        /// A grammar (.aggl)
+        file: PathBuf,
+    },
+    /// Find where the left-hand side of rules holds in a world
+    #[command(
+        after_help = "Example:\n  cortex rules match rules.aggl --rule changeRoom --world world.json"
+    )]
+    Match {
+        /// A grammar (.aggl)
+        file: PathBuf,
+        /// Only this rule [default: every rule]
+        #[arg(long, value_name = "R")]
+        rule: Option<String>,
+        /// A world: graph JSON, RoboComp DSR JSON or AGM model XML
+        #[arg(long, value_name = "W")]
+        world: PathBuf,
+        /// Count the matches without listing them
+        #[arg(long)]
+        count: bool,
+    },
+    /// Show what applying a rule to a world would change; the file stays as it is
+    #[command(
+        after_help = "Example:\n  cortex rules apply rules.aggl --rule changeRoom \
+        --world world.json --bind room2=kitchen"
+    )]
+    Apply {
+        /// A grammar (.aggl)
+        file: PathBuf,
+        /// The rule
+        #[arg(long, value_name = "R")]
+        rule: String,
+        /// A world: graph JSON, RoboComp DSR JSON or AGM model XML
+        #[arg(long, value_name = "W")]
+        world: PathBuf,
+        /// The node, by name or id, that a variable of the rule stands for; as many as it takes to
+        /// leave one match
+        #[arg(long, value_name = "VAR=NODE", num_args = 1.., value_parser = binding)]
+        bind: Vec<(String, String)>,
+    },
+}
+
+fn binding(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((variable, node)) if !variable.is_empty() && !node.is_empty() => {
+            Ok((variable.to_owned(), node.to_owned()))
+        }
+        _ => Err("write VARIABLE=NODE".to_owned()),
+    }
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Plan {
+    /// A grammar (.aggl)
+    pub(crate) domain: PathBuf,
+    /// A world: graph JSON, RoboComp DSR JSON or AGM model XML
+    pub(crate) world: PathBuf,
+    /// A goal (.aggt)
+    pub(crate) goal: PathBuf,
+    /// A plan of least cost, or the proof that there is none
+    #[arg(long)]
+    pub(crate) optimal: bool,
+    /// Stop after so many seconds; without --optimal, look for better plans until then
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub(crate) time_limit: Option<f64>,
+    /// Stop before the search takes more memory than this
+    #[arg(long, value_name = "MB", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) memory_limit: u32,
+    /// For machines
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let seconds: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    if seconds.is_finite() && seconds > 0.0 {
+        Ok(seconds)
+    } else {
+        Err("the time must be more than 0 seconds".to_owned())
+    }
 }

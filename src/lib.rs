@@ -44,6 +44,12 @@ pub fn main() -> ExitCode {
         .with_writer(std::io::stderr)
         .with_ansi(false)
         .init();
+    // Places in files are for editors to jump to: they stay whole, however long.
+    let handler = |_: &_| -> Box<dyn miette::ReportHandler> {
+        Box::new(miette::MietteHandlerOpts::new().wrap_lines(false).build())
+    };
+    // It fails only where there is a handler already, which is as good.
+    drop(miette::set_hook(Box::new(handler)));
     match commands::perform(cli.verb) {
         Ok(Answer::Yes) => ExitCode::SUCCESS,
         Ok(Answer::No) => ExitCode::from(1),

@@ -11,6 +11,7 @@ mod arena;
 mod change;
 mod graph;
 mod ids;
+pub mod interchange;
 pub mod json;
 mod process;
 mod schema;

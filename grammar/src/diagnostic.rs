@@ -127,6 +127,14 @@ pub enum Problem {
         /// What was probably meant.
         suggestion: Option<String>,
     },
+    /// A type that others inherit from, that is not declared itself and looks like one that is.
+    #[error("type `{name}` is not declared, and taken as one that inherits from nothing")]
+    UndeclaredParent {
+        /// As written.
+        name: String,
+        /// What was probably meant.
+        suggestion: String,
+    },
     /// A rule, combo step or alias that is not there.
     #[error("no {what} `{name}`")]
     UnknownName {
@@ -213,7 +221,7 @@ impl Problem {
     /// Whether the file must not be used as it is, or may.
     pub fn severity(&self) -> Severity {
         match self {
-            Self::Incompatible { .. } => Severity::Warning,
+            Self::Incompatible { .. } | Self::UndeclaredParent { .. } => Severity::Warning,
             _ => Severity::Error,
         }
     }
@@ -228,6 +236,9 @@ impl Problem {
             | Self::UnknownName { suggestion, .. } => suggestion
                 .as_ref()
                 .map(|name| format!("did you mean `{name}`?")),
+            Self::UndeclaredParent { suggestion, .. } => {
+                Some(format!("did you mean `{suggestion}`?"))
+            }
             Self::Stray(_) => Some("remove it, or look for a missing opening bracket".to_owned()),
             Self::Deleted { .. } => {
                 Some("keep the node on the right side, or leave the effect out".to_owned())

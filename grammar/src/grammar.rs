@@ -101,9 +101,22 @@ impl Types {
             .flat_map(|declaration| &declaration.names)
     }
 
-    /// Whether `name` is declared.
+    /// Types that stand only where others inherit from them, each once: roots, as in many files
+    /// from elsewhere.
+    pub fn undeclared(&self) -> impl Iterator<Item = &Name> {
+        let mut roots: Vec<&Name> = Vec::new();
+        for parent in self.declarations.iter().flat_map(|d| &d.parents) {
+            if !roots.contains(&parent) && !self.names().any(|declared| declared == parent) {
+                roots.push(parent);
+            }
+        }
+        roots.into_iter()
+    }
+
+    /// Whether `name` is declared, or a declared type inherits from it.
     pub fn contains(&self, name: &str) -> bool {
-        self.names().any(|declared| declared == name)
+        let parents = self.declarations.iter().flat_map(|d| &d.parents);
+        self.names().chain(parents).any(|known| known == name)
     }
 
     /// What `name` inherits from directly.

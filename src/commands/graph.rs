@@ -1,11 +1,11 @@
 //! `cortex graph`: the shared graph of a running instance, or of a file, for people and scripts.
 
-use super::output::{print, print_json};
+use super::output::{print, print_json, tell};
 use crate::cli::{Graph as Arguments, GraphAction, GraphSource};
 use crate::{Answer, Failure};
 use dsr::{
     Attribute, EdgeRef, Filter, Graph, NodeRef, Operation, Owner, Schema, Session, Snapshot, Time,
-    Transaction, Update, Value, json,
+    Transaction, Update, Value, interchange, json,
 };
 use std::fmt::Write as _;
 use std::path::Path;
@@ -66,10 +66,13 @@ pub(crate) fn read_graph(path: &Path) -> Result<Graph, Failure> {
     let place =
         |error: &dyn std::fmt::Display| Failure::input(format!("{}: {error}", path.display()));
     let text = std::fs::read_to_string(path).map_err(|error| place(&error))?;
-    let transaction = json::from_json(&text).map_err(|error| place(&error))?;
+    let import = interchange::read(&text).map_err(|error| place(&error))?;
+    for left_out in &import.left_out {
+        tell(&format!("{}: warning: {left_out}\n", path.display()));
+    }
     let mut graph = Graph::in_memory(Schema::open());
     graph
-        .commit(&transaction, "file", Time::default())
+        .commit(&import.transaction, "file", Time::default())
         .map_err(|error| place(&error))?;
     Ok(graph)
 }
@@ -153,7 +156,7 @@ fn selected(snapshot: &Snapshot, what: Option<&str>) -> Result<Vec<dsr::NodeId>,
 }
 
 /// The failure for a name that nothing has, with the nearest that something has.
-fn no_such(snapshot: &Snapshot, name: &str, what: &str) -> Failure {
+pub(crate) fn no_such(snapshot: &Snapshot, name: &str, what: &str) -> Failure {
     let names: Vec<String> = snapshot
         .nodes()
         .flatten()

@@ -3,6 +3,8 @@
 mod agent;
 mod graph;
 mod output;
+mod plan;
+mod rules;
 mod run;
 mod store;
 
@@ -11,9 +13,10 @@ pub(crate) use agent::AGENTS;
 use crate::cli::Verb;
 use crate::{Answer, Failure};
 use dsr::{Instance, Schema};
-use grammar::{Grammar, SourceFile};
+use grammar::{Diagnostic, Grammar, SourceFile};
 use scenarios::Scenario;
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -23,6 +26,8 @@ pub(crate) fn perform(verb: Verb) -> Result<Answer, Failure> {
         Verb::Agent(arguments) => agent::run(&arguments),
         Verb::Store(arguments) => store::run(&arguments),
         Verb::Graph(arguments) => graph::run(&arguments),
+        Verb::Rules(arguments) => rules::run(&arguments),
+        Verb::Plan(arguments) => plan::run(&arguments),
     }
 }
 
@@ -34,15 +39,39 @@ fn load_scenario(folder: &Path) -> Result<Scenario, Failure> {
     Scenario::load(folder).map_err(|error| Failure::Input(error.into()))
 }
 
-/// Reads a grammar with all that it includes; whatever is wrong with any of it is bad input.
-fn load_grammar(text: &str, path: &Path) -> Result<Grammar, Failure> {
-    let name = path.display().to_string();
-    let mut include = |from: &str, what: &str| -> Result<SourceFile, String> {
+/// Reads a text file that the user named.
+fn read_text(path: &Path) -> Result<String, Failure> {
+    std::fs::read_to_string(path)
+        .map_err(|error| Failure::input(format!("cannot read {}: {error}", path.display())))
+}
+
+/// Reads a grammar with all that it includes, each path relative to the file it stands in, and
+/// tells all that is wrong with any of it.
+fn read_grammar(text: &str, path: &Path) -> (Grammar, Vec<Diagnostic>) {
+    // A file that is reached on two ways is one file, under the name that it was first reached by.
+    let mut names: BTreeMap<PathBuf, String> = BTreeMap::new();
+    let main = path.display().to_string();
+    if let Ok(real) = path.canonicalize() {
+        names.insert(real, main.clone());
+    }
+    let mut include = |what: &str, from: &str| -> Result<SourceFile, String> {
         let file = Path::new(from).parent().unwrap_or(Path::new("")).join(what);
-        let text = std::fs::read_to_string(&file).map_err(|error| error.to_string())?;
-        Ok(SourceFile::new(&file.display().to_string(), &text))
+        let read = || {
+            let real = file.canonicalize()?;
+            Ok((std::fs::read_to_string(&real)?, real))
+        };
+        let (text, real) = read().map_err(|error: std::io::Error| error.to_string())?;
+        let name = names
+            .entry(real)
+            .or_insert_with(|| file.display().to_string());
+        Ok(SourceFile::new(name, &text))
     };
-    let (grammar, diagnostics) = grammar::load_grammar(text, &name, &mut include);
+    grammar::load_grammar(text, &main, &mut include)
+}
+
+/// As [`read_grammar`]; whatever is wrong with any of it is bad input.
+fn load_grammar(text: &str, path: &Path) -> Result<Grammar, Failure> {
+    let (grammar, diagnostics) = read_grammar(text, path);
     if grammar::has_errors(&diagnostics) {
         return Err(Failure::Input(grammar::Defects { diagnostics }.into()));
     }

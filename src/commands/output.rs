@@ -15,3 +15,8 @@ pub(crate) fn print_json(json: &serde_json::Value) -> Result<(), Failure> {
     let text = serde_json::to_string_pretty(json).map_err(Failure::internal)?;
     print(&format!("{text}\n"))
 }
+
+/// Says something beside the answer, on standard error.
+pub(crate) fn tell(text: &str) {
+    drop(std::io::stderr().write_all(text.as_bytes()));
+}

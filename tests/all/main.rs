@@ -10,6 +10,8 @@ mod dependencies;
 mod documentation;
 mod examples;
 mod graph;
+mod plan;
+mod rules;
 mod run;
 mod support;
 mod tree;

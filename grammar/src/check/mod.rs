@@ -115,7 +115,7 @@ impl Check<'_> {
         }
         for declaration in &self.types.declarations {
             for parent in &declaration.parents {
-                self.type_name(parent);
+                self.parent(parent);
                 for name in &declaration.names {
                     if self.types.is_subtype(parent, name) {
                         self.report(
@@ -130,11 +130,29 @@ impl Check<'_> {
         }
     }
 
+    /// A type that others inherit from need not be declared; but it may be a misspelling.
+    fn parent(&mut self, name: &Name) {
+        let mut declared = self.types.names().map(Name::as_str);
+        if self.missing || declared.any(|declared| *name == *declared) {
+            return;
+        }
+        if let Some(suggestion) = suggest(name, self.types.names().map(Name::as_str)) {
+            self.report(
+                name,
+                Problem::UndeclaredParent {
+                    name: name.to_string(),
+                    suggestion,
+                },
+            );
+        }
+    }
+
     fn type_name(&mut self, name: &Name) {
         if self.types.is_empty() || self.missing || self.types.contains(name) {
             return;
         }
-        let suggestion = suggest(name, self.types.names().map(Name::as_str));
+        let known = self.types.names().chain(self.types.undeclared());
+        let suggestion = suggest(name, known.map(Name::as_str));
         self.report(
             name,
             Problem::UnknownType {

@@ -136,7 +136,7 @@ good : passive(0)
     assert_eq!(grammar.rules.len(), 1, "{grammar}");
     expect![[r#"
         f.aggl:2:1: error: expected `key = value` or `===`, found `what is this`
-        f.aggl:7:12: error: no type `rom` (did you mean `room`?)
+        f.aggl:7:12: warning: type `rom` is not declared, and taken as one that inherits from nothing (did you mean `room`?)
         f.aggl:8:2: error: type `a` inherits from itself
         f.aggl:9:2: error: type `b` inherits from itself
         f.aggl:14:9: error: expected `active` or `passive`, found `actve` (did you mean `active`?)
@@ -160,6 +160,17 @@ good : passive(0)
         f.aggl:54:1: error: `}` closes nothing (remove it, or look for a missing opening bracket)
         f.aggl:54:3: error: unknown character '$'
         f.aggl:54:11: error: expected `:` after the rule's name, found the end"#]].assert_eq(&Defects { diagnostics }.to_string());
+}
+
+#[test]
+fn a_type_that_others_inherit_from_need_not_be_declared() {
+    check(
+        "name=x\n===\ntypes { (robot : thing) (room : thing) }\n===
+r : active(1) { { t:thing q:thnig } => { t:thing q:thnig } }",
+        &expect![[r#"
+            f.aggl:5:29: error: no type `thnig` (did you mean `thing`?)
+            f.aggl:5:52: error: no type `thnig` (did you mean `thing`?)"#]],
+    );
 }
 
 #[test]

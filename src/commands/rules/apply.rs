@@ -1,0 +1,243 @@
+//! `cortex rules apply`: what a rule would change in a world, tried on a graph of this process.
+
+use super::{Names, find_rule, load, words};
+use crate::commands::graph::{no_such, read_graph};
+use crate::commands::output::{print, print_json};
+use crate::{Answer, Failure};
+use dsr::{Graph, NodeId, NodeRef, Operation, Owner, Snapshot, Time, Transaction, json};
+use grammar::{ApplyError, Binding, Grammar, Rule};
+use serde_json::{Map, Value as Json, json};
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// The binding that the user gave, by names or ids of nodes.
+fn given(snapshot: &Snapshot, bind: &[(String, String)]) -> Result<Binding, Failure> {
+    let mut binding = Binding::new();
+    for (variable, node) in bind {
+        let mut found = snapshot
+            .find_node_by_name(node)
+            .map_err(Failure::internal)?;
+        if let (None, Ok(id)) = (&found, node.parse()) {
+            found = snapshot.find_node(NodeId(id)).map_err(Failure::internal)?;
+        }
+        let found = found.ok_or_else(|| no_such(snapshot, node, "node"))?;
+        if binding
+            .get(variable)
+            .is_some_and(|bound| bound != found.id())
+        {
+            return Err(Failure::input(format!(
+                "`{variable}` is bound to two nodes"
+            )));
+        }
+        binding.insert(variable.as_str(), found.id());
+    }
+    Ok(binding)
+}
+
+/// The one match that extends a binding, or why there is none.
+fn the_match(
+    grammar: &Grammar,
+    snapshot: &Snapshot,
+    rule: &Rule,
+    given: &Binding,
+) -> Result<Result<Binding, String>, Failure> {
+    let found = grammar
+        .matches(snapshot, rule, given)
+        .map_err(Failure::input)?;
+    let found: Vec<Binding> = found
+        .take(2)
+        .collect::<Result<_, _>>()
+        .map_err(Failure::internal)?;
+    let all_given = given.len() == rule.bound_nodes().count();
+    match &found[..] {
+        [one] => Ok(Ok(one.clone())),
+        [] if all_given => {
+            let why = grammar
+                .obstacle(snapshot, rule, given)
+                .map_err(Failure::internal)?;
+            Ok(Err(why.map_or_else(String::new, |why| why.to_string())))
+        }
+        [] if given.is_empty() => Ok(Err("its left-hand side holds nowhere".to_owned())),
+        [] => Ok(Err(
+            "its left-hand side holds nowhere with this binding".to_owned()
+        )),
+        [first, second, ..] => {
+            let mut names = Names::new(snapshot);
+            let pair = [names.of_all(first)?, names.of_all(second)?].map(|m| words(rule, &m));
+            let help = format!("choose with --bind, for example:\n{}\n{}", pair[0], pair[1]);
+            Err(Failure::input_with_help(
+                format!("`{}` matches more than once", rule.name),
+                help,
+            ))
+        }
+    }
+}
+
+pub(super) fn apply(
+    file: &Path,
+    name: &str,
+    world: &Path,
+    bind: &[(String, String)],
+    as_json: bool,
+) -> Result<Answer, Failure> {
+    let grammar = load(file)?;
+    let rule = find_rule(&grammar, name)?;
+    let mut graph = read_graph(world)?;
+    let snapshot = graph.snapshot();
+    let given = given(&snapshot, bind)?;
+    let applied = match the_match(&grammar, &snapshot, rule, &given)? {
+        Ok(binding) => operations(&grammar, &mut graph, rule, &binding)?.map(|o| (binding, o)),
+        Err(reason) => Err(reason),
+    };
+    let (binding, operations) = match applied {
+        Ok(applied) => applied,
+        Err(reason) if as_json => {
+            print_json(&json!({"rule": name, "applicable": false, "reason": reason}))?;
+            return Ok(Answer::No);
+        }
+        Err(reason) => {
+            print(&format!("{name} is not applicable: {reason}\n"))?;
+            return Ok(Answer::No);
+        }
+    };
+    let mut names = Names::new(&snapshot);
+    let named = names.of_all(&binding)?;
+    let mut rows = Vec::new();
+    let mut text = format!("{name}  {}\n", words(rule, &named));
+    for operation in &operations {
+        let (row, line) = describe(&mut names, operation)?;
+        rows.push(row);
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "    {line}");
+    }
+    if as_json {
+        let cost = grammar.cost(&snapshot, rule, &binding).ok();
+        print_json(&json!({
+            "rule": name, "applicable": true, "binding": named, "cost": cost, "operations": rows,
+        }))?;
+    } else {
+        print(&text)?;
+    }
+    Ok(Answer::Yes)
+}
+
+/// What the rule does at a match; or why it, or the graph, does not allow it.
+fn operations(
+    grammar: &Grammar,
+    graph: &mut Graph,
+    rule: &Rule,
+    binding: &Binding,
+) -> Result<Result<Vec<Operation>, String>, Failure> {
+    let operations = match grammar.apply(&graph.snapshot(), &rule.name, binding) {
+        Ok(operations) => operations,
+        Err(ApplyError::Match(error)) => return Err(Failure::internal(error)),
+        Err(refused) => return Ok(Err(refused.to_string())),
+    };
+    let transaction = Transaction {
+        preconditions: Vec::new(),
+        operations: operations.clone(),
+    };
+    let committed = graph.commit(&transaction, "rules", Time::default());
+    Ok(committed
+        .map(|_| operations)
+        .map_err(|refusal| refusal.to_string()))
+}
+
+/// An operation as JSON and as a line.
+fn describe(names: &mut Names<'_>, operation: &Operation) -> Result<(Json, String), Failure> {
+    let mut name = |node: &NodeRef| match node {
+        NodeRef::Id(id) => names.of(*id),
+        NodeRef::Name(name) => Ok(name.clone()),
+    };
+    let values = |list: &[(String, dsr::Value)]| -> Map<String, Json> {
+        list.iter()
+            .map(|(name, value)| (name.clone(), json::value_to_json(value)))
+            .collect()
+    };
+    Ok(match operation {
+        Operation::CreateNode {
+            type_name,
+            name,
+            attributes,
+            ..
+        } => (
+            json!({"do": "create_node", "node": name, "type": type_name, "attributes": values(attributes)}),
+            format!("+ {name} : {type_name}"),
+        ),
+        Operation::DeleteNode { node } => {
+            let node = name(node)?;
+            (
+                json!({"do": "delete_node", "node": node}),
+                format!("- {node}"),
+            )
+        }
+        Operation::RetypeNode { node, type_name } => {
+            let node = name(node)?;
+            let line = format!("{node} : {type_name}");
+            (
+                json!({"do": "retype_node", "node": node, "type": type_name}),
+                line,
+            )
+        }
+        Operation::CreateEdge { edge, attributes } => {
+            let (from, label, to) = (name(&edge.from)?, &edge.label, name(&edge.to)?);
+            let line = format!("+ {from} -{label}-> {to}");
+            let attributes = values(attributes);
+            (
+                json!({"do": "create_edge", "from": from, "label": label, "to": to, "attributes": attributes}),
+                line,
+            )
+        }
+        Operation::DeleteEdge { edge } => {
+            let (from, label, to) = (name(&edge.from)?, &edge.label, name(&edge.to)?);
+            let line = format!("- {from} -{label}-> {to}");
+            (
+                json!({"do": "delete_edge", "from": from, "label": label, "to": to}),
+                line,
+            )
+        }
+        Operation::SetAttribute {
+            owner,
+            name: attribute,
+            value,
+        } => {
+            let (mut row, owner) = owner_json(&mut name, owner)?;
+            let value = json::value_to_json(value);
+            let line = format!("{owner}.{attribute} = {value}");
+            row["do"] = json!("set_attribute");
+            row["attribute"] = json!(attribute);
+            row["value"] = value;
+            (row, line)
+        }
+        Operation::RemoveAttribute {
+            owner,
+            name: attribute,
+        } => {
+            let (mut row, owner) = owner_json(&mut name, owner)?;
+            row["do"] = json!("remove_attribute");
+            row["attribute"] = json!(attribute);
+            (row, format!("- {owner}.{attribute}"))
+        }
+        Operation::ApplyRule { rule, .. } => (
+            json!({"do": "apply_rule", "rule": rule}),
+            format!("{rule}()"),
+        ),
+    })
+}
+
+fn owner_json(
+    name: &mut dyn FnMut(&NodeRef) -> Result<String, Failure>,
+    owner: &Owner,
+) -> Result<(Json, String), Failure> {
+    Ok(match owner {
+        Owner::Node(node) => {
+            let node = name(node)?;
+            (json!({ "node": node }), node)
+        }
+        Owner::Edge(edge) => {
+            let (from, label, to) = (name(&edge.from)?, &edge.label, name(&edge.to)?);
+            let line = format!("{from}-{label}->{to}");
+            (json!({"from": from, "label": label, "to": to}), line)
+        }
+    })
+}

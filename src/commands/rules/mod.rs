@@ -1,0 +1,367 @@
+//! `cortex rules`: what a grammar says, what is wrong with it, where its rules hold in a world and
+//! what they would change there. Nothing here writes to any file.
+
+mod apply;
+
+use super::graph::read_graph;
+use super::output::{print, print_json, tell};
+use crate::cli::{Rules as Arguments, RulesAction};
+use crate::{Answer, Failure};
+use dsr::{NodeId, Snapshot};
+use grammar::{Binding, Combo, Defects, Diagnostic, Grammar, Problem, Rule, Severity};
+use serde_json::{Map, Value as Json, json};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
+use std::path::Path;
+use std::time::Instant;
+
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
+    let json = arguments.json;
+    match &arguments.action {
+        RulesAction::Check { file } => check(file, json),
+        RulesAction::List { file } => list(file, json),
+        RulesAction::Fmt { file } => format(file, json),
+        RulesAction::Match {
+            file,
+            rule,
+            world,
+            count,
+        } => matches(file, rule.as_deref(), world, *count, json),
+        RulesAction::Apply {
+            file,
+            rule,
+            world,
+            bind,
+        } => apply::apply(file, rule, world, bind, json),
+    }
+}
+
+fn read(file: &Path) -> Result<(Grammar, Vec<Diagnostic>), Failure> {
+    Ok(super::read_grammar(&super::read_text(file)?, file))
+}
+
+fn load(file: &Path) -> Result<Grammar, Failure> {
+    super::load_grammar(&super::read_text(file)?, file)
+}
+
+fn diagnostics_json(diagnostics: &[Diagnostic]) -> Vec<Json> {
+    let row = |diagnostic: &Diagnostic| {
+        let (line, column) = diagnostic.line_and_column();
+        let message = match diagnostic.problem.help() {
+            Some(help) => format!("{diagnostic} ({help})"),
+            None => diagnostic.to_string(),
+        };
+        json!({
+            "severity": diagnostic.severity().to_string(), "file": diagnostic.file.name(),
+            "line": line, "column": column, "message": message,
+        })
+    };
+    diagnostics.iter().map(row).collect()
+}
+
+/// Says what is suspicious or wrong without ending the verb.
+fn warn(diagnostics: Vec<Diagnostic>) {
+    if !diagnostics.is_empty() {
+        tell(&format!("{}\n", Defects { diagnostics }));
+    }
+}
+
+fn check(file: &Path, as_json: bool) -> Result<Answer, Failure> {
+    let (grammar, diagnostics) = read(file)?;
+    if as_json {
+        print_json(&json!({ "diagnostics": diagnostics_json(&diagnostics) }))?;
+    }
+    if grammar::has_errors(&diagnostics) {
+        return Err(Failure::Input(Defects { diagnostics }.into()));
+    }
+    warn(diagnostics);
+    if !as_json {
+        let (rules, combos) = (grammar.rules.len(), grammar.combos.len());
+        let types = grammar.types.names().count();
+        let combos = if combos == 0 {
+            String::new()
+        } else {
+            format!(", {combos} combos")
+        };
+        print(&format!(
+            "{}: {types} types, {rules} rules{combos}\n",
+            file.display()
+        ))?;
+    }
+    Ok(Answer::Yes)
+}
+
+/// A cost as it is where it is a number, else as it is written.
+fn cost_json(rule: &Rule) -> Json {
+    rule.cost
+        .as_number()
+        .map_or_else(|| json!(rule.cost.to_string()), |cost| json!(cost))
+}
+
+fn rule_json(rule: &Rule) -> Json {
+    let nodes = |nodes: &mut dyn Iterator<Item = &grammar::PatternNode>| -> Vec<Json> {
+        nodes
+            .map(|n| json!({"name": &*n.variable, "type": &*n.type_name}))
+            .collect()
+    };
+    json!({
+        "name": &*rule.name,
+        "active": rule.kind == grammar::Kind::Active,
+        "cost": cost_json(rule),
+        "parameters": nodes(&mut rule.parameters.iter()),
+        "variables": nodes(&mut rule.bound_nodes()),
+        "agent": rule.agent.as_deref(),
+        "success": rule.success,
+        "dormant": rule.dormant,
+        "hierarchical": rule.hierarchical,
+        "combo": false,
+    })
+}
+
+fn combo_json(combo: &Combo) -> Json {
+    let steps: Vec<Json> = combo
+        .steps
+        .iter()
+        .map(|s| json!({"rule": &*s.rule, "alias": &*s.alias, "optional": s.optional}))
+        .collect();
+    json!({
+        "name": &*combo.name,
+        "active": combo.kind == grammar::Kind::Active,
+        "cost": combo.cost,
+        "parameters": [],
+        "combo": true,
+        "steps": steps,
+    })
+}
+
+fn list(file: &Path, as_json: bool) -> Result<Answer, Failure> {
+    let (grammar, diagnostics) = read(file)?;
+    if as_json {
+        let rules = grammar.rules.iter().map(rule_json);
+        let types = grammar.types.names().chain(grammar.types.undeclared());
+        let mut types: Vec<&str> = types.map(|name| &**name).collect();
+        let mut seen = BTreeSet::new();
+        types.retain(|name| seen.insert(*name));
+        print_json(&json!({
+            "types": types,
+            "rules": rules.chain(grammar.combos.iter().map(combo_json)).collect::<Vec<_>>(),
+            "diagnostics": diagnostics_json(&diagnostics),
+        }))?;
+        return Ok(Answer::Yes);
+    }
+    let mut text = String::new();
+    for declaration in &grammar.types.declarations {
+        let names = |names: &[grammar::Name]| {
+            names
+                .iter()
+                .map(|name| &**name)
+                .collect::<Vec<&str>>()
+                .join(" ")
+        };
+        let parents = match names(&declaration.parents) {
+            none if none.is_empty() => String::new(),
+            parents => format!(" : {parents}"),
+        };
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "type {}{parents}", names(&declaration.names));
+    }
+    for rule in &grammar.rules {
+        let variables: Vec<String> = rule.bound_nodes().map(ToString::to_string).collect();
+        let agent = rule
+            .agent
+            .as_ref()
+            .map_or_else(String::new, |agent| format!(", by {agent}"));
+        let _ = writeln!(
+            text,
+            "rule {} : {}, cost {}{agent}  ({})",
+            rule.name,
+            rule.kind,
+            rule.cost,
+            variables.join(" ")
+        );
+    }
+    for combo in &grammar.combos {
+        let steps: Vec<&str> = combo.steps.iter().map(|step| &*step.rule).collect();
+        let (name, kind, cost) = (&combo.name, combo.kind, combo.cost);
+        let _ = writeln!(
+            text,
+            "combo {name} : {kind}, cost {cost}  ({})",
+            steps.join(", ")
+        );
+    }
+    print(&text)?;
+    warn(diagnostics);
+    Ok(Answer::Yes)
+}
+
+fn format(file: &Path, as_json: bool) -> Result<Answer, Failure> {
+    let (grammar, diagnostics) = read(file)?;
+    // What cannot be read would be lost. An included file is not printed: it may be missing.
+    let main = grammar.files.first().map(grammar::SourceFile::name);
+    let (lost, rest): (Vec<Diagnostic>, Vec<Diagnostic>) = diagnostics.into_iter().partition(|d| {
+        d.severity() == Severity::Error
+            && !matches!(d.problem, Problem::Include { .. })
+            && Some(d.file.name()) == main
+    });
+    if !lost.is_empty() {
+        return Err(Failure::Input(Defects { diagnostics: lost }.into()));
+    }
+    warn(rest);
+    if as_json {
+        print_json(&json!({ "text": grammar.to_string() }))?;
+    } else {
+        print(&grammar.to_string())?;
+    }
+    Ok(Answer::Yes)
+}
+
+fn find_rule<'a>(grammar: &'a Grammar, name: &str) -> Result<&'a Rule, Failure> {
+    if let Some(rule) = grammar.rule(name) {
+        return Ok(rule);
+    }
+    if grammar.combos.iter().any(|combo| combo.name == *name) {
+        let message = format!("`{name}` is a combo: it has no left-hand side of its own");
+        return Err(Failure::input_with_help(
+            message,
+            "name one of the rules that it is made of",
+        ));
+    }
+    let known = dsr::suggest(name, grammar.rules.iter().map(|rule| &*rule.name));
+    let help = known.map_or_else(
+        || "`cortex rules list` lists what there is".to_owned(),
+        |known| format!("did you mean `{known}`?"),
+    );
+    Err(Failure::input_with_help(
+        format!("there is no rule `{name}`"),
+        help,
+    ))
+}
+
+/// Names of nodes, each read once.
+struct Names<'a> {
+    snapshot: &'a Snapshot,
+    known: BTreeMap<NodeId, String>,
+}
+
+impl<'a> Names<'a> {
+    fn new(snapshot: &'a Snapshot) -> Self {
+        Self {
+            snapshot,
+            known: BTreeMap::new(),
+        }
+    }
+
+    fn of(&mut self, id: NodeId) -> Result<String, Failure> {
+        if let Some(name) = self.known.get(&id) {
+            return Ok(name.clone());
+        }
+        let node = self.snapshot.find_node(id).map_err(Failure::internal)?;
+        let name = node
+            .map(|node| node.name())
+            .transpose()
+            .map_err(Failure::internal)?;
+        let name = name.unwrap_or_else(|| format!("node {id}"));
+        self.known.insert(id, name.clone());
+        Ok(name)
+    }
+
+    fn of_all(&mut self, binding: &Binding) -> Result<Map<String, Json>, Failure> {
+        let pairs = binding.iter();
+        pairs
+            .map(|(variable, id)| Ok((variable.to_string(), self.of(id)?.into())))
+            .collect()
+    }
+}
+
+/// The names of a binding in the order of the rule, for people.
+fn words(rule: &Rule, named: &Map<String, Json>) -> String {
+    let pairs = rule.bound_nodes().filter_map(|node| {
+        let name = named.get(&*node.variable)?.as_str()?;
+        Some(format!("{}={name}", node.variable))
+    });
+    pairs.collect::<Vec<_>>().join(" ")
+}
+
+/// What matching a rule came to.
+struct Found {
+    count: u64,
+    matches: Vec<Binding>,
+    seconds: f64,
+}
+
+fn find(grammar: &Grammar, snapshot: &Snapshot, rule: &Rule, keep: bool) -> Result<Found, Failure> {
+    #[allow(
+        clippy::disallowed_methods,
+        reason = "the verb tells how long matching took"
+    )]
+    let started = Instant::now();
+    let mut matches = Vec::new();
+    let mut count = 0;
+    for found in grammar
+        .matches(snapshot, rule, &Binding::new())
+        .map_err(Failure::internal)?
+    {
+        let found = found.map_err(Failure::internal)?;
+        count += 1;
+        if keep {
+            matches.push(found);
+        }
+    }
+    Ok(Found {
+        count,
+        matches,
+        seconds: started.elapsed().as_secs_f64(),
+    })
+}
+
+fn matches(
+    file: &Path,
+    rule: Option<&str>,
+    world: &Path,
+    only_count: bool,
+    as_json: bool,
+) -> Result<Answer, Failure> {
+    let grammar = load(file)?;
+    let rules: Vec<&Rule> = match rule {
+        Some(name) => vec![find_rule(&grammar, name)?],
+        None => grammar.rules.iter().collect(),
+    };
+    let graph = read_graph(world)?;
+    let snapshot = graph.snapshot();
+    let mut names = Names::new(&snapshot);
+    let mut rows = Vec::new();
+    for one in rules {
+        let found = find(&grammar, &snapshot, one, !only_count)?;
+        let named = found.matches.iter().map(|binding| names.of_all(binding));
+        let named = named.collect::<Result<Vec<_>, _>>()?;
+        if as_json {
+            let mut row = json!({
+                "rule": &*one.name, "count": found.count, "seconds": found.seconds,
+            });
+            if !only_count {
+                row["matches"] = json!(named);
+            }
+            rows.push(row);
+            continue;
+        }
+        let mut text = String::new();
+        let plural = if found.count == 1 { "match" } else { "matches" };
+        let milliseconds = found.seconds * 1e3;
+        let heading = format!(
+            "{}: {} {plural} in {milliseconds:.3} ms",
+            one.name, found.count
+        );
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "{heading}");
+        for named in &named {
+            let _ = writeln!(text, "    {}", words(one, named));
+        }
+        print(&text)?;
+    }
+    if as_json {
+        // Asked for one rule, the answer is of one rule.
+        let one = rule.is_some().then(|| rows.pop()).flatten();
+        print_json(&one.unwrap_or(Json::Array(rows)))?;
+    }
+    Ok(Answer::Yes)
+}
