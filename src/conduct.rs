@@ -100,6 +100,8 @@ struct Conductor<'a> {
     agents: Vec<usize>,
     world: usize,
     recording: Recording,
+    /// Samples of the world that did not arrive.
+    lost: u64,
     interrupted: &'a AtomicBool,
     progress: &'a mut Progress,
 }
@@ -132,11 +134,15 @@ fn run(
 
 /// The store's rescue: saves the graph as this process still sees it, for the next store.
 fn rescue(session: &mut Session) -> Result<Vec<OsString>, String> {
-    let snapshot = session.snapshot().map_err(|error| error.to_string())?;
-    let image = Image::of(&snapshot).map_err(|error| error.to_string())?;
     let path = session.instance().folder().join("graph.image");
-    std::fs::write(&path, image.to_bytes())
-        .map_err(|error| format!("{}: {error}", path.display()))?;
+    // A store that died before it showed its graph was not written to: what the one before it left
+    // is still the newest.
+    if session.epoch().is_ok() || !path.exists() {
+        let snapshot = session.snapshot().map_err(|error| error.to_string())?;
+        let image = Image::of(&snapshot).map_err(|error| error.to_string())?;
+        std::fs::write(&path, image.to_bytes())
+            .map_err(|error| format!("{}: {error}", path.display()))?;
+    }
     Ok(vec!["--restore".into(), path.into()])
 }
 
@@ -164,6 +170,7 @@ impl<'a> Conductor<'a> {
             agents: Vec::new(),
             world: 0,
             recording: Recording::default(),
+            lost: 0,
             interrupted,
             progress,
         };
@@ -310,7 +317,13 @@ impl<'a> Conductor<'a> {
 
     /// Keeps what the world has told since the last time.
     fn record(&mut self) -> Result<(), ConductError> {
-        self.recording.truths.extend(self.truth.drain()?);
+        for truth in self.truth.drain()? {
+            if let Some(last) = self.recording.truths.last() {
+                let missed = (truth.time.since(last.time) / TICK).round() as i64 - 1;
+                self.lost += u64::try_from(missed).unwrap_or(0);
+            }
+            self.recording.truths.push(truth);
+        }
         Ok(())
     }
 
@@ -358,8 +371,7 @@ impl<'a> Conductor<'a> {
             }
         }
         let all = missions.len() >= self.settings.scenario.missions.len();
-        let over =
-            |m: &MissionState| matches!(m.status.as_str(), "succeeded" | "failed" | "cancelled");
+        let over = |m: &MissionState| matches!(m.status.as_str(), "succeeded" | "failed");
         let ended = all && missions.iter().all(over);
         self.recording.missions = missions;
         Ok(ended)
@@ -374,6 +386,13 @@ impl<'a> Conductor<'a> {
         let members: Vec<usize> = members.chain(std::iter::once(self.world)).collect();
         self.supervisor.stop();
         self.record()?;
+        if self.lost > 0 {
+            let (lost, all) = (self.lost, self.recording.truths.len());
+            self.progress.say(&format!(
+                "{lost} samples of the world were lost beside {all} that arrived: the figures are \
+                 less exact; use a lower --speed"
+            ));
+        }
         self.recording.accounts = members
             .into_iter()
             .map(|index| {

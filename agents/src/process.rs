@@ -12,7 +12,7 @@ use crate::object_recognition::ObjectRecognition;
 use crate::social_mapping::config::{ConfigError, SocialConfig};
 use crate::social_mapping::graph::{SocialMapping, StepError};
 use dsr::{
-    AttachError, InstanceError, ReadError, Session, Snapshot, Time, Transaction, TurnError, Turns,
+    AttachError, Begin, InstanceError, ReadError, Session, Snapshot, Time, Transaction, TurnError,
 };
 use thiserror::Error;
 
@@ -56,10 +56,11 @@ fn current<T>(outcome: Result<T, ReadError>) -> Result<Option<T>, ReadError> {
 /// Takes turns with a core that makes a transaction of camera frames.
 fn perceive(
     mut session: Session,
-    mut turns: Turns,
+    begin: Begin,
     mut step: impl FnMut(Time, &[CameraFrame], &Snapshot) -> Result<Transaction, ReadError>,
 ) -> Result<(), ProcessError> {
     let mut frames = session.subscriber::<CameraFrame>(DETECTIONS)?;
+    let mut turns = begin()?;
     while let Some(tick) = turns.next(&mut session)? {
         let seen = frames.drain()?;
         let snapshot = session.snapshot()?;
@@ -74,9 +75,9 @@ fn perceive(
 ///
 /// # Errors
 /// [`ProcessError`].
-pub fn human_observer(session: Session, turns: Turns) -> Result<(), ProcessError> {
+pub fn human_observer(session: Session, begin: Begin) -> Result<(), ProcessError> {
     let mut core = HumanObserver::new(crate::human_observer::Config::default());
-    perceive(session, turns, |now, frames, snapshot| {
+    perceive(session, begin, |now, frames, snapshot| {
         core.step(now, frames, snapshot)
     })
 }
@@ -85,9 +86,9 @@ pub fn human_observer(session: Session, turns: Turns) -> Result<(), ProcessError
 ///
 /// # Errors
 /// [`ProcessError`].
-pub fn object_recognition(session: Session, turns: Turns) -> Result<(), ProcessError> {
+pub fn object_recognition(session: Session, begin: Begin) -> Result<(), ProcessError> {
     let mut core = ObjectRecognition::new(crate::object_recognition::Config::default());
-    perceive(session, turns, |now, frames, snapshot| {
+    perceive(session, begin, |now, frames, snapshot| {
         core.step(now, frames, snapshot)
     })
 }
@@ -96,10 +97,11 @@ pub fn object_recognition(session: Session, turns: Turns) -> Result<(), ProcessE
 ///
 /// # Errors
 /// [`ProcessError`].
-pub fn social_mapping(mut session: Session, mut turns: Turns) -> Result<(), ProcessError> {
+pub fn social_mapping(mut session: Session, begin: Begin) -> Result<(), ProcessError> {
     let grids = session.publisher::<Vec<u8>>(SOCIAL_GRID)?;
     let core = SocialMapping::new(SocialConfig::default(), MAP_PERIOD);
     let mut core = core.map_err(ProcessError::Config)?;
+    let mut turns = begin()?;
     while let Some(tick) = turns.next(&mut session)? {
         let snapshot = session.snapshot()?;
         let turn = match core.step(tick.time, &snapshot) {
@@ -128,7 +130,7 @@ pub fn social_mapping(mut session: Session, mut turns: Turns) -> Result<(), Proc
 ///
 /// # Errors
 /// [`ProcessError`].
-pub fn navigation(mut session: Session, mut turns: Turns) -> Result<(), ProcessError> {
+pub fn navigation(mut session: Session, begin: Begin) -> Result<(), ProcessError> {
     let mut odometry = session.subscriber::<Odometry>(ODOMETRY)?;
     let mut scans = session.subscriber::<LaserScan>(LASER)?;
     let mut grids = session.subscriber::<Vec<u8>>(SOCIAL_GRID)?;
@@ -136,6 +138,7 @@ pub fn navigation(mut session: Session, mut turns: Turns) -> Result<(), ProcessE
     let speech = session.publisher::<Speech>(SPEECH)?;
     let mut core = Navigation::new(crate::navigation::navigator::Config::default());
     let (mut pose, mut scan, mut grid) = (None, None, None);
+    let mut turns = begin()?;
     while let Some(tick) = turns.next(&mut session)? {
         pose = odometry.newest()?.or(pose);
         scan = scans.newest()?.or(scan);

@@ -29,7 +29,7 @@ pub use arena::ReadError;
 pub use change::{Change, EdgeChange, Filter, NodeChange, RuleApplication, Touch};
 pub use graph::{Graph, Image, Limits, RuleEngine, decode_image};
 pub use ids::{AttributeId, EdgeKey, Epoch, LabelId, NodeId, TypeId, Version, WriterId};
-pub use process::{Pace, TurnError, Turns, done_line, turn_line};
+pub use process::{Begin, Pace, TurnError, Turns, done_line, turn_line};
 pub use schema::{
     AttributeType, Label, NameKind, NodeType, Schema, SchemaError, SchemaFileError, suggest,
 };

@@ -40,6 +40,10 @@ pub enum TurnError {
     BadTurn(String),
 }
 
+/// Says that the process is ready, and gives its turns: to be called when all that a turn needs is
+/// open, so that nothing that is sent in the first turn is missed.
+pub type Begin = Box<dyn FnOnce() -> Result<Turns, TurnError>>;
+
 /// What a supervisor says to give a process its turn.
 pub fn turn_line(tick: Tick) -> String {
     format!("turn {} {}\n", tick.index, tick.time.nanoseconds())

@@ -67,7 +67,10 @@ impl Snapshot {
     }
 
     /// Turns the outcome of a walk through the arena into what the caller may see.
-    fn genuine<T>(&self, outcome: Result<T, Address>) -> Result<T, ReadError> {
+    pub(in crate::snapshot) fn genuine<T>(
+        &self,
+        outcome: Result<T, Address>,
+    ) -> Result<T, ReadError> {
         match outcome {
             Ok(found) => self.check().map(|()| found),
             Err(address) => Err(self.arena.broken(self.root.version, address)),

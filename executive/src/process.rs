@@ -2,7 +2,7 @@
 //! decided. It guarantees that a turn whose snapshot was overtaken is left out, not guessed.
 
 use crate::{Executive, MissionSpec, Planner, RulePlanner};
-use dsr::{AttachError, ReadError, Session, Time, TurnError, Turns, Version};
+use dsr::{AttachError, Begin, ReadError, Session, Time, TurnError, Version};
 use grammar::Grammar;
 use thiserror::Error;
 
@@ -30,11 +30,11 @@ pub enum ProcessError {
 /// [`ProcessError`].
 pub fn run(
     session: Session,
-    turns: Turns,
+    begin: Begin,
     grammar: Grammar,
     missions: Vec<MissionSpec>,
 ) -> Result<(), ProcessError> {
-    run_with(session, turns, grammar, missions, RulePlanner::default())
+    run_with(session, begin, grammar, missions, RulePlanner::default())
 }
 
 /// Runs the executive with a planner of the caller's until it shall end.
@@ -43,13 +43,14 @@ pub fn run(
 /// [`ProcessError`].
 pub fn run_with<P: Planner>(
     mut session: Session,
-    mut turns: Turns,
+    begin: Begin,
     grammar: Grammar,
     missions: Vec<MissionSpec>,
     planner: P,
 ) -> Result<(), ProcessError> {
     let mut core = Executive::new(grammar, missions, planner);
     let mut looked: Option<(Version, Time)> = None;
+    let mut turns = begin()?;
     while let Some(tick) = turns.next(&mut session)? {
         let snapshot = session.snapshot()?;
         let still = |(version, time)| {

@@ -6,7 +6,7 @@ use agents::messages::{
     CameraFrame, DETECTIONS, LASER, LaserScan, ODOMETRY, Odometry, SPEECH, Speech, VELOCITY,
     VelocityCommand,
 };
-use dsr::{InstanceError, Publisher, Session, Subscriber, Tick, Time, TurnError, Turns};
+use dsr::{Begin, InstanceError, Publisher, Session, Subscriber, Tick, Time, TurnError};
 use std::time::{Duration, Instant};
 use thiserror::Error;
 
@@ -84,18 +84,19 @@ pub fn tick_time(start: Time, index: u64) -> Time {
 )]
 pub fn run(
     mut session: Session,
-    mut turns: Turns,
+    begin: Begin,
     mut world: World,
     speed: f64,
 ) -> Result<(), ProcessError> {
     let mut ports = Ports::open(&session)?;
+    let announce = session.clock()?;
+    let mut turns = begin()?;
     if turns.in_lockstep() {
         while turns.next(&mut session)?.is_some() {
             ports.step(&mut world)?;
         }
         return Ok(());
     }
-    let announce = session.clock()?;
     let period = Duration::from_secs_f64(TICK / speed);
     let mut due = Instant::now();
     let mut index = 0;

@@ -32,7 +32,7 @@ pub struct Report {
     /// `robot`, `people`, `psi` and `psi_moving` of the run.
     #[serde(flatten)]
     pub metrics: Metrics,
-    /// The steps of the missions' last plans, in order.
+    /// The steps that were taken up, of all plans, in order.
     pub plan: Vec<StepReport>,
     /// How often a plan was given up for another one.
     pub replans: u64,
@@ -67,6 +67,8 @@ pub struct MissionOutcome {
 /// One step of a plan.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct StepReport {
+    /// The mission that it is for.
+    pub mission: String,
     /// The rule to apply.
     pub rule: String,
     /// Names of nodes for the rule's variables.

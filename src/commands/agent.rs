@@ -2,7 +2,7 @@
 
 use crate::cli::Agent as Arguments;
 use crate::{Answer, Failure};
-use dsr::{Pace, Session, Turns};
+use dsr::{Begin, Pace, Session, Turns};
 use executive::MissionSpec;
 use scenarios::{Scenario, Tracks, World};
 use std::time::Duration;
@@ -45,7 +45,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
         (false, false) => Pace::Alone,
     };
     let stop = super::interruption()?;
-    let begin = || Turns::begin(pace, stop).map_err(Failure::internal);
+    let begin: Begin = Box::new(move || Turns::begin(pace, stop));
     // Input is read before anything is joined, so that what is wrong with it is told at once.
     let outcome = match name {
         "world" => {
@@ -54,7 +54,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
             let tracks = tracks.map_err(|error| Failure::Input(error.into()))?;
             let world = World::new(&scenario, arguments.seed, tracks);
             let session = attach(&instance, name)?;
-            scenarios::process::run(session, begin()?, world, arguments.speed)
+            scenarios::process::run(session, begin, world, arguments.speed)
                 .map_err(Failure::internal)
         }
         "executive" => {
@@ -62,7 +62,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
             let (_, grammar) = super::load_rules(&scenario)?;
             let missions = scenario.missions.iter().map(mission).collect();
             let session = attach(&instance, name)?;
-            executive::process::run(session, begin()?, grammar, missions).map_err(Failure::internal)
+            executive::process::run(session, begin, grammar, missions).map_err(Failure::internal)
         }
         _ => {
             let session = attach(&instance, name)?;
@@ -72,7 +72,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
                 "social_mapping" => agents::process::social_mapping,
                 _ => agents::process::navigation,
             };
-            run(session, begin()?).map_err(Failure::internal)
+            run(session, begin).map_err(Failure::internal)
         }
     };
     outcome?;

@@ -206,6 +206,7 @@ fn mission(state: &MissionState) -> MissionOutcome {
 /// A step as the report has it; those of plans that were given up before they began are left out.
 fn step(state: &StepState) -> Option<StepReport> {
     (state.status != "dropped").then(|| StepReport {
+        mission: state.mission.clone(),
         rule: state.rule.clone(),
         binding: serde_json::from_str(&state.binding).unwrap_or_default(),
         status: state.status.clone(),

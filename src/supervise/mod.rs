@@ -6,6 +6,7 @@ mod child;
 use child::{Child, Event, EventKind};
 use dsr::{Instance, Tick, done_line};
 use std::ffi::OsString;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::process::ExitStatus;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -397,6 +398,11 @@ impl Hold {
                 instance.name()
             )
         })?;
+        // The run before may have removed the file between its opening here and its lock.
+        let locked = lock.metadata().into_diagnostic()?.ino();
+        if std::fs::metadata(&path).map(|m| m.ino()).ok() != Some(locked) {
+            return Self::take(instance);
+        }
         instance.remove().into_diagnostic()?;
         Ok(Self {
             instance: instance.clone(),

@@ -26,10 +26,14 @@ fn no_reader_sees_half_a_transaction_while_another_process_writes_flat_out() {
     for reader in readers {
         let told = reader.finish();
         let told: Vec<u64> = told.split(' ').map(|n| n.parse().unwrap()).collect();
-        let [reads, torn, _outlived] = told[..] else {
+        let [reads, torn, outlived] = told[..] else {
             panic!("{told:?}")
         };
         assert_eq!(torn, 0, "of {reads} reads");
+        assert!(
+            outlived > 10,
+            "memory was reused under the reader {outlived} times"
+        );
         assert!(reads > 1000, "{reads} reads");
     }
     writer.finish();
@@ -133,14 +137,14 @@ fn subscribers_hear_what_their_filter_names_and_of_gaps() {
     };
     assert_eq!(change.version, Version(4));
     // More commits than a subscriber's buffer holds.
-    for i in 0..200 {
+    for i in 0..400 {
         let mut transaction = Transaction::new();
         transaction.set("ann", "mood", f64::from(i));
         session.commit(&transaction, Time::default()).unwrap();
     }
     assert!(
         matches!(next(&mut moods), Update::Gap(_)),
-        "200 commits do not fit"
+        "400 commits do not fit"
     );
     drop((moods, places, session));
     store.finish();
@@ -217,4 +221,19 @@ fn nothing_is_left_of_an_instance_that_was_removed() {
         Vec::<std::path::PathBuf>::new()
     );
     assert!(!instance.0.folder().exists());
+}
+
+#[test]
+fn an_instance_leaves_alone_another_whose_name_begins_with_its_own() {
+    let (short, long) = (TestInstance::new("a"), TestInstance::new("a"));
+    let longer = TestInstance::named(&format!("{}_b", short.name()));
+    let stores = [&short, &longer, &long].map(|instance| Process::peer("store", instance));
+    let [first, second, third] = stores;
+    first.kill();
+    short.0.remove().unwrap();
+    let mut session = Session::attach(&longer.0, "agent", PATIENCE).unwrap();
+    assert_eq!(session.snapshot().unwrap().node_count(), 0);
+    drop(session);
+    second.finish();
+    third.finish();
 }

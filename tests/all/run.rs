@@ -20,6 +20,16 @@ fn zones(psi: &Value) -> [f64; 4] {
     ["intimate", "personal", "social", "public"].map(|zone| psi[zone].as_f64().unwrap())
 }
 
+/// Less time in people's intimate and personal space than without social behaviour.
+fn assert_politer(report: &Value) {
+    let close = |psi: &Value| zones(psi)[0] + zones(psi)[1];
+    let (with, without) = (close(&report["psi"]), close(&report["baseline"]["psi"]));
+    assert!(
+        with < without,
+        "in people's space {with} % of the time with, {without} % without"
+    );
+}
+
 #[test]
 fn the_same_seed_gives_the_same_report_byte_for_byte() {
     let reports = [(); 2].map(|()| {
@@ -53,12 +63,7 @@ fn the_care_centre_is_crossed_and_reported_beside_the_run_without_social_behavio
         let sum: f64 = zones(psi).iter().sum();
         assert!((sum - 100.0).abs() < 1e-6, "{psi}");
     }
-    let close = |psi: &Value| zones(psi)[0] + zones(psi)[1];
-    let (with, without) = (close(&report["psi"]), close(&report["baseline"]["psi"]));
-    assert!(
-        with < without,
-        "in people's space {with} % of the time with, {without} % without"
-    );
+    assert_politer(&report);
     assert!(report["robot"]["path_length"].as_f64().unwrap() > 10.0);
     assert_eq!(report["robot"]["collisions"], 0);
     let rules: Vec<&str> = report["plan"]
@@ -84,6 +89,16 @@ fn the_care_centre_is_crossed_and_reported_beside_the_run_without_social_behavio
             "{picture}"
         );
     }
+}
+
+#[test]
+fn the_plaza_is_crossed_there_and_back_among_walkers() {
+    let folder = Run::new("plaza", &[PLAZA, "--lockstep", "--seed", "1"]).succeed();
+    let (_, report) = report(folder.path());
+    assert_eq!(report["success"], true);
+    assert_eq!(report["mission"]["missions"].as_array().unwrap().len(), 3);
+    assert_eq!(report["robot"]["collisions"], 0);
+    assert_politer(&report);
 }
 
 /// A recording in the shape of `obsmat.txt`: two people who walk across the plaza and back.
@@ -124,7 +139,15 @@ fn recorded_pedestrians_take_the_place_of_simulated_ones() {
 fn an_agent_that_is_killed_is_restarted_and_the_mission_still_succeeds() {
     let mut run = Run::new("killed", &[CARE_CENTRE, "--speed", "10", "--no-baseline"]).start();
     run.until("mission invite is running");
-    for victim in ["navigation", "human_observer", "executive", "store"] {
+    const VICTIMS: [&str; 6] = [
+        "navigation",
+        "human_observer",
+        "object_recognition",
+        "social_mapping",
+        "executive",
+        "store",
+    ];
+    for victim in VICTIMS {
         run.kill(victim);
         run.until(&format!("{victim} ended"));
     }
@@ -133,10 +156,24 @@ fn an_agent_that_is_killed_is_restarted_and_the_mission_still_succeeds() {
     assert_eq!(report["success"], true);
     let agents = report["agents"].as_array().unwrap();
     let restarts = |name| agents.iter().find(|a| a["name"] == name).unwrap()["restarts"].clone();
-    for victim in ["navigation", "human_observer", "executive", "store"] {
+    for victim in VICTIMS {
         assert_eq!(restarts(victim), 1, "{victim}");
     }
-    assert_eq!(restarts("social_mapping"), 0);
+    assert_eq!(restarts("world"), 0);
+}
+
+#[test]
+fn a_store_that_is_killed_again_and_again_loses_nothing() {
+    let mut run = Run::new("stores", &[CARE_CENTRE, "--speed", "10", "--no-baseline"]).start();
+    run.until("mission invite is running");
+    for _ in 0..3 {
+        run.kill("store");
+        run.until("store ended");
+    }
+    let folder = run.succeed();
+    let (_, report) = report(folder.path());
+    assert_eq!(report["success"], true);
+    assert_eq!(report["agents"][0]["restarts"], 3);
 }
 
 #[test]
@@ -246,44 +283,4 @@ fn a_broken_scenario_is_told_with_line_and_column() {
         told.contains("rules.aggl:") && told.contains("robot"),
         "{told}"
     );
-}
-
-#[test]
-fn a_system_started_by_hand_works_and_the_last_process_out_removes_it() {
-    let instance = crate::support::TestInstance::new("by-hand");
-    let name = instance.name();
-    let start = |arguments: &[&str]| {
-        let mut command = Program::command(arguments);
-        command
-            .args(["--instance", name])
-            .stderr(std::process::Stdio::null());
-        command.spawn().unwrap()
-    };
-    let mut store = start(&["store", "--scenario", PLAZA]);
-    let mut observer = start(&["agent", "human_observer"]);
-    let mut world = start(&["agent", "world", "--scenario", PLAZA, "--speed", "5"]);
-    let patience = std::time::Duration::from_secs(20);
-    let mut session = dsr::Session::attach(&instance.0, "test", patience).unwrap();
-    let mut changes = session.changes(dsr::Filter::default()).unwrap();
-    let seen = loop {
-        let snapshot = session.snapshot().unwrap();
-        let person = snapshot.schema().type_id("person").unwrap();
-        let seen = snapshot.count_of_type(person).unwrap();
-        if seen > 0 {
-            break seen;
-        }
-        changes.wait(patience).unwrap();
-        while changes.next(snapshot.schema()).unwrap().is_some() {}
-    };
-    assert!(seen > 0);
-    drop((changes, session));
-    for child in [&mut world, &mut observer, &mut store] {
-        crate::support::interrupt(child.id());
-        assert!(child.wait().unwrap().success());
-    }
-    assert_eq!(
-        instance.0.shared_memory().unwrap(),
-        Vec::<std::path::PathBuf>::new()
-    );
-    assert!(!instance.0.folder().exists());
 }

@@ -49,6 +49,10 @@ fn end_of_input() -> Arc<AtomicBool> {
 
 fn store(instance: &Instance) -> Outcome {
     let mut store = Store::open(instance, Schema::open())?;
+    // Little history, so that memory of old versions is reused under slow readers.
+    store.graph_mut().set_limits(dsr::Limits {
+        history_bytes: 64 << 10,
+    });
     println!("ready");
     let ended = end_of_input();
     while !ended.load(Ordering::Acquire) {
@@ -106,12 +110,21 @@ fn read_pairs(instance: &Instance) -> Outcome {
     let ended = end_of_input();
     let (mut reads, mut torn, mut outlived) = (0u64, 0u64, 0u64);
     while !ended.load(Ordering::Acquire) {
+        // Again and again until the version is outlived: that is when it could go wrong.
         let snapshot = session.snapshot()?;
-        match pairs_agree(&snapshot) {
-            Ok(true) => reads += 1,
-            Ok(false) => torn += 1,
-            Err(ReadError::SnapshotTooOld { .. }) => outlived += 1,
-            Err(other) => return Err(other.into()),
+        loop {
+            match pairs_agree(&snapshot) {
+                Ok(true) => reads += 1,
+                Ok(false) => torn += 1,
+                Err(ReadError::SnapshotTooOld { .. }) => {
+                    outlived += 1;
+                    break;
+                }
+                Err(other) => return Err(other.into()),
+            }
+            if ended.load(Ordering::Acquire) {
+                break;
+            }
         }
     }
     println!("{reads} {torn} {outlived}");

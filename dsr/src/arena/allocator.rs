@@ -185,13 +185,12 @@ impl Allocator {
         }
     }
 
-    /// Frees blocks of old versions until at most `keep_bytes` of them are left, never those
-    /// that a version from `pinned` on reaches.
-    pub(crate) fn reclaim(&mut self, arena: &Arena, keep_bytes: usize, pinned: Option<u64>) {
+    /// Frees blocks of old versions until at most `keep_bytes` of them are left.
+    pub(crate) fn reclaim(&mut self, arena: &Arena, keep_bytes: usize) {
         let mut count: usize = 0;
         let mut words = self.retired_words;
         for block in &self.retired {
-            if words * 8 <= keep_bytes || pinned.is_some_and(|pinned| block.version >= pinned) {
+            if words * 8 <= keep_bytes {
                 break;
             }
             words -= size_class(block.words).1;
@@ -265,9 +264,8 @@ mod tests {
             block,
             "version 1 can still be read"
         );
-        allocator.reclaim(&arena, 0, Some(1));
-        assert_eq!(arena.oldest(), 0, "version 1 is leased");
-        allocator.reclaim(&arena, 0, None);
+        assert_eq!(arena.oldest(), 0);
+        allocator.reclaim(&arena, 0);
         assert_eq!(arena.oldest(), 2);
         assert_eq!(allocator.allocate(&arena, 10).unwrap(), block);
     }

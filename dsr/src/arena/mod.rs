@@ -327,6 +327,8 @@ impl Arena {
     /// Makes `root` the newest version: one release store, before which nobody sees any of it.
     pub(crate) fn publish(&self, root: &Root) {
         if let (Some(slot), Some(head)) = (self.root_at(root.version), self.header(at::HEAD)) {
+            // Whoever sees any of this root in the slot sees that `head` has come near it.
+            fence(Ordering::Release);
             for (to, from) in slot.iter().zip(root.to_words()) {
                 to.store(from);
             }

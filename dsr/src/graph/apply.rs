@@ -31,6 +31,9 @@ type Touched<K, V> = BTreeMap<K, (V, Touch, Vec<AttributeId>)>;
 /// What a written attribute remembers.
 #[derive(Debug, Clone, Copy)]
 struct Stamp {
+    /// Of the node or edge.
+    record: u64,
+    /// Of the attribute.
     version: u64,
     time: i64,
     writer: u16,
@@ -90,6 +93,7 @@ impl<'a> Work<'a> {
             root,
             agent: agent.to_owned(),
             stamp: Stamp {
+                record: root.version,
                 version: root.version,
                 time: root.time,
                 writer,
@@ -109,6 +113,7 @@ impl<'a> Work<'a> {
         let mut work = Self::new(graph, "store", time)?;
         for node in nodes {
             let type_name = work.schema().type_name(node.type_id).to_owned();
+            work.stamp.record = node.version;
             work.create_node(Some(node.id), &type_name, &node.name, &[])?;
             work.restore_attributes(&Owner::Node(node.id.into()), &node.attributes)?;
         }
@@ -119,6 +124,7 @@ impl<'a> Work<'a> {
                 label,
                 to: edge.key.to.into(),
             };
+            work.stamp.record = edge.version;
             work.create_edge(&key, &[])?;
             work.restore_attributes(&Owner::Edge(key), &edge.attributes)?;
         }
@@ -139,6 +145,7 @@ impl<'a> Work<'a> {
     ) -> Result<(), Refusal> {
         for row in rows {
             self.stamp = Stamp {
+                record: self.stamp.record,
                 version: row.version,
                 time: row.time,
                 writer: row.writer,

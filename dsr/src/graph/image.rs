@@ -25,12 +25,14 @@ pub(super) struct NodeImage {
     pub(super) id: NodeId,
     pub(super) type_id: TypeId,
     pub(super) name: String,
+    pub(super) version: u64,
     pub(super) attributes: Vec<AttributeImage>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct EdgeImage {
     pub(super) key: EdgeKey,
+    pub(super) version: u64,
     pub(super) attributes: Vec<AttributeImage>,
 }
 
@@ -69,6 +71,7 @@ impl Image {
                 id,
                 type_id,
                 name: node.name()?,
+                version: node.version()?.0,
                 attributes,
             });
             for key in node.out_edges() {
@@ -77,7 +80,12 @@ impl Image {
                     continue;
                 };
                 let attributes = edge.attributes()?.into_iter().map(image).collect();
-                edges.push(EdgeImage { key, attributes });
+                let version = edge.version()?.0;
+                edges.push(EdgeImage {
+                    key,
+                    version,
+                    attributes,
+                });
             }
         }
         Ok(Self {

@@ -12,7 +12,6 @@ use crate::arena::{Address, Arena, Root, record};
 use crate::{
     Change, Commit, Epoch, NodeId, Operation, Refusal, Schema, Snapshot, Time, Transaction, Version,
 };
-use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
@@ -122,8 +121,6 @@ pub struct Graph {
     epoch: Epoch,
     limits: Limits,
     rules: Option<Arc<dyn RuleEngine>>,
-    /// Leases: the oldest version that each holder reads.
-    leases: BTreeMap<u64, u64>,
 }
 
 impl Graph {
@@ -158,13 +155,11 @@ impl Graph {
             epoch,
             limits: Limits::default(),
             rules: None,
-            leases: BTreeMap::new(),
         };
         let mut root = graph.root;
         graph.write_schema(&mut root)?;
         root.version = 1;
         graph.publish(root);
-        graph.writer.arena.format(epoch);
         Ok(graph)
     }
 
@@ -194,6 +189,12 @@ impl Graph {
     /// This life of the store.
     pub fn epoch(&self) -> Epoch {
         self.epoch
+    }
+
+    /// Shows the graph to other processes, which until then see none: what they see first is
+    /// whole.
+    pub(crate) fn announce(&self) {
+        self.writer.arena.format(self.epoch);
     }
 
     /// Bytes that the current and the still readable old versions take.
@@ -266,10 +267,9 @@ impl Graph {
     }
 
     fn reclaim(&mut self, keep_bytes: usize) {
-        let pinned = self.leases.values().min().copied();
         self.writer
             .allocator
-            .reclaim(&self.writer.arena, keep_bytes, pinned);
+            .reclaim(&self.writer.arena, keep_bytes);
     }
 
     fn full(&self) -> Refusal {

@@ -4,7 +4,7 @@
 //! iceoryx2 does not promise that a sample may be written after it was sent; its version is pinned
 //! and `tests/all/graph.rs` holds the construct.
 
-use super::{InstanceError, Ipc, IpcNode, MAX_PROCESSES, ipc, service_name};
+use super::{InstanceError, Ipc, IpcNode, MAX_PROCESSES, MAX_STORES, ipc, service_name};
 use crate::Epoch;
 use crate::arena::allocator::{Full, Growth};
 use crate::arena::{Arena, Segment, Word};
@@ -39,7 +39,7 @@ fn service(node: &IpcNode) -> Result<Factory, InstanceError> {
     node.service_builder(&service_name("graph/arena")?)
         .publish_subscribe::<[Word]>()
         .user_header::<SegmentHeader>()
-        .max_publishers(2)
+        .max_publishers(MAX_STORES)
         .max_subscribers(MAX_PROCESSES)
         .max_nodes(MAX_PROCESSES)
         .history_size(CAPACITY)

@@ -2,7 +2,7 @@
 //! told so.
 
 use super::{InstanceError, Ipc, Subscriber, ipc};
-use crate::{Change, Filter, Schema, Version};
+use crate::{Change, Epoch, Filter, Schema, Version};
 use iceoryx2::port::listener::Listener;
 use std::time::Duration;
 
@@ -21,6 +21,7 @@ pub struct Changes {
     pub(super) subscriber: Subscriber<Change>,
     pub(super) listener: Listener<Ipc>,
     pub(super) filter: Filter,
+    pub(super) epoch: Epoch,
     pub(super) seen: Version,
 }
 
@@ -42,13 +43,14 @@ impl Changes {
     /// [`InstanceError`].
     pub fn next(&mut self, schema: &Schema) -> Result<Option<Update>, InstanceError> {
         while let Some(change) = self.subscriber.receive()? {
-            // What the subscription started from is known already.
-            if change.version <= self.seen {
+            // What the subscription started from is known already; another store's is not.
+            if change.epoch == self.epoch && change.version <= self.seen {
                 continue;
             }
-            let expected = Version(self.seen.0 + 1);
+            let follows = change.version == Version(self.seen.0 + 1);
+            self.epoch = change.epoch;
             self.seen = change.version;
-            if change.version != expected {
+            if !follows {
                 return Ok(Some(Update::Gap(change.version)));
             }
             if self.filter.passes(&change, schema) {

@@ -12,9 +12,9 @@ use serde::de::DeserializeOwned;
 use std::marker::PhantomData;
 
 /// Messages that a receiver may be behind before it loses the oldest.
-pub(crate) const BUFFER: usize = 64;
+pub(crate) const BUFFER: usize = 256;
 /// Messages of one sender that can be under way at once; address space only, until they are used.
-const UNDER_WAY: usize = 1024;
+const UNDER_WAY: usize = 4096;
 
 fn service(node: &IpcNode, name: &str) -> Result<PortFactory<Ipc, [u8], ()>, InstanceError> {
     node.service_builder(&service_name(name)?)

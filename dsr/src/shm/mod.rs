@@ -22,6 +22,7 @@ use iceoryx2::prelude::{
     SemanticString, ServiceName, SignalHandlingMode, ipc_threadsafe, set_log_level,
 };
 use std::fs;
+use std::hash::Hasher;
 use std::io;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
@@ -34,6 +35,8 @@ pub(crate) type IpcNode = iceoryx2::node::Node<Ipc>;
 
 /// How many processes and ports one instance may have.
 pub(crate) const MAX_PROCESSES: usize = 64;
+/// How many lives of the store may leave their ports behind before somebody cleans up.
+pub(crate) const MAX_STORES: usize = 8;
 /// Where shared memory shows up as files.
 const SHARED_MEMORY: &str = "/dev/shm";
 
@@ -106,11 +109,11 @@ impl Instance {
 
     /// What the names of its shared-memory files start with.
     fn prefix(&self) -> String {
-        format!(
-            "cortex_{}_{}_",
-            rustix::process::getuid().as_raw(),
-            self.name
-        )
+        // A hash, for names of sockets have little room; and an end that no other prefix has.
+        let mut hasher = rustc_hash::FxHasher::default();
+        hasher.write(self.name.as_bytes());
+        let hash = hasher.finish();
+        format!("cortex_{}_{hash:016x}.", rustix::process::getuid().as_raw())
     }
 
     /// Whether anything of it is there.

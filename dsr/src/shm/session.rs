@@ -245,7 +245,8 @@ impl Session {
     fn arena(&mut self) -> Result<Option<(Epoch, Arc<Arena>)>, InstanceError> {
         let found = self.arena.poll()?;
         Ok(found.filter(|(epoch, arena)| {
-            arena.epoch() == Some(*epoch) && arena.announced_segments() <= arena.attached() as u64
+            // Segments arrive in order; the snapshot waits for the last.
+            arena.epoch() == Some(*epoch)
         }))
     }
 
@@ -278,6 +279,11 @@ impl Session {
         };
         loop {
             let root = arena.newest_root()?;
+            // A version made since the last look may lie in a segment that has come since.
+            if arena.announced_segments() > arena.attached() as u64 {
+                self.arena.poll()?;
+                continue;
+            }
             let known = self
                 .schema
                 .as_ref()
@@ -390,11 +396,13 @@ impl Session {
             .listener_builder()
             .create()
             .map_err(|e| ipc("the listener for commits", e))?;
+        let epoch = self.epoch()?;
         let seen = self.snapshot()?.version();
         Ok(Changes {
             subscriber,
             listener,
             filter,
+            epoch,
             seen,
         })
     }

@@ -56,6 +56,8 @@ impl Store {
     pub fn open(instance: &Instance, schema: Schema) -> Result<Self, StoreError> {
         instance.create_folder()?;
         let node = instance.join()?;
+        // A store that was killed has left its ports behind, which count.
+        node.try_cleanup_dead_nodes();
         let arena = ArenaPublisher::open(&node)?;
         let epoch = new_epoch();
         let (memory, growth) = arena.arena(epoch);
@@ -131,6 +133,7 @@ impl Store {
     /// # Errors
     /// [`StoreError::Instance`] where the instance's shared memory is gone.
     pub fn serve(&mut self, patience: Duration) -> Result<usize, StoreError> {
+        self.graph.announce();
         self.wake
             .timed_wait(|_| (), patience)
             .map_err(|e| ipc("waiting for requests", e))?;

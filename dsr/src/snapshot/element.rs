@@ -225,6 +225,17 @@ impl Edge<'_> {
         self.key
     }
 
+    /// The commit that last changed the edge's attributes, or made it.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn version(&self) -> Result<Version, ReadError> {
+        let words = self.snapshot.arena.from(self.address);
+        let word = words.and_then(|words| words.get(3));
+        let version = word.map(Word::load).ok_or(self.address);
+        self.snapshot.genuine(version).map(Version)
+    }
+
     /// One attribute, if the edge has it.
     ///
     /// # Errors

@@ -64,6 +64,7 @@ fn report() -> Report {
             0,
         ),
         plan: vec![StepReport {
+            mission: "invite".to_owned(),
             rule: "changeRoom".to_owned(),
             binding: BTreeMap::from([("r".to_owned(), "robot".to_owned())]),
             status: "done".to_owned(),

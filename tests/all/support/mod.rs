@@ -3,7 +3,7 @@
 mod program;
 
 pub(crate) use crate::tree::root;
-pub(crate) use program::{Program, Run, interrupt};
+pub(crate) use program::{Program, Run};
 
 use dsr::Instance;
 use std::io::{BufRead, BufReader, Read};

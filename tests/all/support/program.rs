@@ -204,11 +204,6 @@ impl Drop for Started {
     }
 }
 
-/// Sends what Ctrl-C sends.
-pub(crate) fn interrupt(id: u32) {
-    signal(id, Signal::INT);
-}
-
 fn signal(id: u32, signal: Signal) {
     if let Some(process) = Pid::from_raw(id.cast_signed()) {
         // It may have ended already, which is as good.

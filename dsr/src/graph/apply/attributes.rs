@@ -51,7 +51,7 @@ impl Work<'_> {
                 let (address, mut record) = self.node(node)?;
                 let len = record.words().len();
                 let name = self.change_row(&mut record.rows, name, value)?;
-                record.version = self.stamp.version;
+                record.version = self.stamp.record;
                 self.put_node(Some((address, len)), &record)?;
                 let type_id = TypeId(record.type_id);
                 touch(
@@ -66,7 +66,7 @@ impl Work<'_> {
                 let (key, address, mut record) = self.edge(edge)?;
                 let len = record.words().len();
                 let name = self.change_row(&mut record.rows, name, value)?;
-                record.version = self.stamp.version;
+                record.version = self.stamp.record;
                 self.put_edge(key, Some((address, len)), &record)?;
                 touch(&mut self.edges, key, (), Touch::Updated, Some(name));
             }

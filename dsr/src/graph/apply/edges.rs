@@ -58,7 +58,7 @@ impl Work<'_> {
             },
         };
         let len = record.words().len();
-        record.version = self.stamp.version;
+        record.version = self.stamp.record;
         let how = if existing.is_some() {
             Touch::Updated
         } else {

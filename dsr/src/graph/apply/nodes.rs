@@ -73,7 +73,7 @@ impl Work<'_> {
             id: id.0,
             type_id: type_id.0,
             name: 0,
-            version: self.stamp.version,
+            version: self.stamp.record,
             out: 0,
             into: 0,
             rows: Vec::new(),
@@ -175,7 +175,7 @@ impl Work<'_> {
         self.index_type(type_id, id, true)?;
         let len = node.words().len();
         node.type_id = type_id.0;
-        node.version = self.stamp.version;
+        node.version = self.stamp.record;
         self.put_node(Some((address, len)), &node)?;
         touch(&mut self.nodes, id, type_id, Touch::Updated, None);
         Ok(())
