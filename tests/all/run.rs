@@ -135,18 +135,20 @@ fn recorded_pedestrians_take_the_place_of_simulated_ones() {
     assert_eq!(report["people"].as_array().unwrap().len(), 2);
 }
 
+/// Whom the supervisor starts again.
+const VICTIMS: [&str; 6] = [
+    "navigation",
+    "human_observer",
+    "object_recognition",
+    "social_mapping",
+    "executive",
+    "store",
+];
+
 #[test]
 fn an_agent_that_is_killed_is_restarted_and_the_mission_still_succeeds() {
     let mut run = Run::new("killed", &[CARE_CENTRE, "--speed", "10", "--no-baseline"]).start();
     run.until("mission invite is running");
-    const VICTIMS: [&str; 6] = [
-        "navigation",
-        "human_observer",
-        "object_recognition",
-        "social_mapping",
-        "executive",
-        "store",
-    ];
     for victim in VICTIMS {
         run.kill(victim);
         run.until(&format!("{victim} ended"));
