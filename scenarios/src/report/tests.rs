@@ -259,6 +259,7 @@ fn the_json_has_the_fields_that_are_promised() {
           "psi_moving": null,
           "plan": [
             {
+              "mission": "invite",
               "rule": "changeRoom",
               "binding": {
                 "r": "robot"
