@@ -174,6 +174,8 @@ fn set<K: Ord, V: PartialEq>(map: &mut BTreeMap<K, V>, key: K, value: V) -> Opti
 #[derive(Debug, Default)]
 struct Plan {
     created: Vec<(String, String)>,
+    /// The number that the next node of a type tries.
+    numbered: BTreeMap<String, usize>,
     deleted: BTreeSet<String>,
     retyped: BTreeMap<String, String>,
     wanted: BTreeSet<LinkKey>,
@@ -193,14 +195,17 @@ impl Plan {
         let counted = |of: &String| {
             of == type_name || subtypes.is_some_and(|(_, special)| special.contains(&of.as_str()))
         };
+        // Names are taken in turn, so that of those made before, the last of the type tells where to
+        // go on: quantified effects make thousands.
         let first = model.nodes.values().filter(|of| counted(of)).count() + 1;
-        let taken = |name: &String| {
-            model.nodes.contains_key(name) || self.created.iter().any(|(other, _)| other == name)
+        let n = self.numbered.entry(type_name.to_owned()).or_insert(first);
+        let name = loop {
+            let name = format!("{type_name}_{n}");
+            *n += 1;
+            if !model.nodes.contains_key(&name) {
+                break name;
+            }
         };
-        let name = (first..first + 1000)
-            .map(|n| format!("{type_name}_{n}"))
-            .find(|name| !taken(name))
-            .unwrap();
         self.created.push((name.clone(), type_name.to_owned()));
         name
     }
