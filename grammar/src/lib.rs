@@ -73,6 +73,7 @@ mod grammar;
 mod lexer;
 mod load;
 mod matching;
+mod number;
 mod parser;
 mod print;
 mod rule;
@@ -90,6 +91,7 @@ pub use grammar::{
 };
 pub use load::{Defects, Loader, has_errors, load_grammar, parse_goal, parse_grammar};
 pub use matching::{End, MatchError, Matches, Obstacle, ValueError};
+pub use number::Number;
 pub use parser::DEPTH_LIMIT;
 pub use rule::{
     Arithmetic, AttributePath, Comparison, Condition, Effect, Expression, Kind, Literal, Pattern,

@@ -4,8 +4,8 @@
 //! and none is superfluous in the snapshot that they were made for.
 
 use super::ApplyError;
-use crate::matching::{Slot, compare, words};
-use crate::{Comparison, Name};
+use crate::matching::{Slot, words};
+use crate::{Comparison, Name, Number};
 use dsr::{
     EdgeKey, EdgeRef, NodeId, NodeRef, Operation, Owner, ReadError, Snapshot, Value, ValueKind,
 };
@@ -110,7 +110,7 @@ impl<'a> Changes<'a> {
     fn assign(&mut self, target: Target, attribute: &Name, value: Value) -> Result<(), ApplyError> {
         let key = (target, attribute.to_string());
         match self.assigned.get(&key) {
-            Some(before) if !compare(Comparison::Equal, before, &value) => {
+            Some(before) if !Comparison::Equal.holds(before, &value) => {
                 Err(ApplyError::Contradiction {
                     what: format!("`{attribute}` of one thing"),
                     first: words(before),
@@ -304,8 +304,8 @@ impl<'a> Changes<'a> {
 
 /// The number as another kind, if it is the same number there.
 fn convert(value: &Value, kind: ValueKind) -> Option<Value> {
-    use crate::matching::Number::{Real, Whole};
-    let number = crate::matching::Number::of(value)?;
+    use Number::{Real, Whole};
+    let number = Number::of(value)?;
     let whole = match number {
         Whole(n) => Some(n),
         Real(x) if x.fract() == 0.0 && x.abs() < 1e15 => Some(x as i128),

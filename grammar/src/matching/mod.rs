@@ -15,12 +15,12 @@ pub use search::Matches;
 
 pub(crate) use choice::Choices;
 pub(crate) use domain::Domain as MatchDomain;
-pub(crate) use evaluate::{Environment, Number, compare};
+pub(crate) use evaluate::Environment;
 pub(crate) use obstacle::words;
 pub(crate) use program::{Compiler, Link, Slot, Term, Test};
 pub(crate) use search::Problem;
 
-use crate::{Binding, Condition, Expression, Grammar, PatternEdge, PatternNode, Rule};
+use crate::{Binding, Condition, Expression, Grammar, Number, PatternEdge, PatternNode, Rule};
 use dsr::{ReadError, Snapshot, Value};
 
 /// Why a match, condition or expression could not be looked at.
