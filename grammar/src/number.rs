@@ -119,10 +119,10 @@ mod tests {
     #[test]
     fn numbers_compare_across_their_kinds_and_text_has_no_order() {
         let yes = |operator: Comparison, a: Value, b: Value| {
-            assert!(operator.holds(&a, &b), "{a:?} {b:?}")
+            assert!(operator.holds(&a, &b), "{a:?} {b:?}");
         };
         let no = |operator: Comparison, a: Value, b: Value| {
-            assert!(!operator.holds(&a, &b), "{a:?} {b:?}")
+            assert!(!operator.holds(&a, &b), "{a:?} {b:?}");
         };
         yes(Comparison::Equal, Value::I64(2), Value::F64(2.0));
         yes(
