@@ -11,8 +11,10 @@ pub enum Touch {
     Created,
     /// It is gone.
     Deleted,
-    /// Its attributes or its type changed.
+    /// Its attributes changed.
     Updated,
+    /// It went and came again, or its type changed: nothing that was known of it need hold.
+    Replaced,
 }
 
 /// One touched node.

@@ -9,11 +9,12 @@ pub use element::{Attribute, Edge, Node};
 use crate::arena::record;
 use crate::arena::tree::{self, Key};
 use crate::arena::{Address, Arena, ReadError, Root, trie};
+use crate::value::{hash, place};
 use crate::{
-    EdgeKey, LabelId, NodeId, Pose, Schema, Time, TypeId, Value, Version, WriterId, pose_on_floor,
+    AttributeId, EdgeKey, LabelId, NodeId, Pose, Schema, Time, TypeId, Value, Version, WriterId,
+    pose_on_floor,
 };
 use nalgebra::Isometry2;
-use std::hash::Hasher;
 use std::sync::Arc;
 
 /// The graph as of one commit.
@@ -26,10 +27,24 @@ pub struct Snapshot {
     pub(crate) schema: Arc<Schema>,
 }
 
-pub(crate) fn name_hash(name: &str) -> u64 {
-    let mut hasher = rustc_hash::FxHasher::default();
-    hasher.write(name.as_bytes());
-    hasher.finish()
+/// Which values of an attribute to look for in its index.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ValueRange {
+    /// This one.
+    Equal(Value),
+    /// Numbers from the first to the second, both included.
+    Between(f64, f64),
+}
+
+/// How many edges of a label join nodes of two types.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TripleCount {
+    /// The exact type of the sources.
+    pub from: TypeId,
+    /// The exact type of the targets.
+    pub to: TypeId,
+    /// How many.
+    pub count: u64,
 }
 
 impl Snapshot {
@@ -109,7 +124,7 @@ impl Snapshot {
     /// # Errors
     /// [`ReadError`].
     pub fn find_node_by_name(&self, name: &str) -> Result<Option<Node<'_>>, ReadError> {
-        let hash = name_hash(name);
+        let hash = hash(name);
         let mut range = self.range(self.root.names, [hash, 0], [hash, u64::MAX])?;
         while let Some((key, _)) = self.genuine(range.next(&self.arena))? {
             if let Some(node) = self.find_node(NodeId(key[1]))?
@@ -159,6 +174,61 @@ impl Snapshot {
             let (key, _) = entry?;
             self.find_node(NodeId(key[0]))?
                 .ok_or(ReadError::Damaged { address: 0 })
+        })
+    }
+
+    /// The nodes of a type, but not of its subtypes, by ascending id.
+    pub fn ids_of_type(&self, exact: TypeId) -> NodeIds<'_> {
+        let entry = record::directory_entry(&self.arena, self.root.types, exact.0);
+        let root = self.genuine(entry).map(|(tree, _)| tree);
+        NodeIds {
+            scan: self.scan(root, [0, 0], [u64::MAX, u64::MAX]),
+            word: 0,
+        }
+    }
+
+    /// How many nodes are of a type, but not of its subtypes.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn count_of_exact_type(&self, exact: TypeId) -> Result<u64, ReadError> {
+        let entry = record::directory_entry(&self.arena, self.root.types, exact.0);
+        Ok(self.genuine(entry)?.1)
+    }
+
+    /// The nodes that an attribute's index has in a range, by ascending number (or by the texts'
+    /// hashes), then id; none if the attribute has no index.
+    ///
+    /// Look at the values, too: texts of equal hash, and whole numbers that are nearest to the
+    /// same f64, come together.
+    pub fn ids_by_value(&self, attribute: AttributeId, range: &ValueRange) -> NodeIds<'_> {
+        let entry = record::directory_entry(&self.arena, self.root.values, attribute.0);
+        let root = self.genuine(entry).map(|(tree, _)| tree);
+        let places = match range {
+            ValueRange::Equal(value) => value.place().map(|place| (place, place)),
+            ValueRange::Between(from, to) => Some((place(*from), place(*to))),
+        };
+        let (root, (from, to)) = places.map_or((Ok(0), (0, 0)), |places| (root, places));
+        NodeIds {
+            scan: self.scan(root, [from, 0], [to, u64::MAX]),
+            word: 1,
+        }
+    }
+
+    /// How many edges of a label join nodes of which exact types, by types.
+    pub fn triple_counts(
+        &self,
+        label: LabelId,
+    ) -> impl Iterator<Item = Result<TripleCount, ReadError>> {
+        let from = record::triple(label.0, 0, 0);
+        let to = record::triple(label.0, u16::MAX, u16::MAX);
+        self.scan(Ok(self.root.triples), from, to).map(|entry| {
+            let ([key, _], count) = entry?;
+            Ok(TripleCount {
+                from: TypeId((key >> 16) as u16),
+                to: TypeId(key as u16),
+                count,
+            })
         })
     }
 
@@ -296,7 +366,25 @@ impl Snapshot {
     }
 }
 
+/// Ids of nodes, one after another.
+#[derive(Debug)]
+pub struct NodeIds<'a> {
+    scan: Scan<'a>,
+    /// Which word of the keys is the id.
+    word: usize,
+}
+
+impl Iterator for NodeIds<'_> {
+    type Item = Result<NodeId, ReadError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let entry = self.scan.next()?;
+        Some(entry.map(|(key, _)| NodeId(key[self.word])))
+    }
+}
+
 /// Walks a part of a tree.
+#[derive(Debug)]
 struct Scan<'a> {
     snapshot: &'a Snapshot,
     range: Option<Result<tree::Range, ReadError>>,

@@ -4,6 +4,7 @@
 use nalgebra::{Isometry2, Isometry3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use std::hash::Hasher;
 
 /// A pose in space: the isometry `parent_from_node`, metres.
 pub type Pose = Isometry3<f64>;
@@ -123,10 +124,42 @@ impl ValueKind {
         }
     }
 
+    /// Whether the graph can keep an index by values of this kind.
+    pub const fn can_have_index(self) -> bool {
+        matches!(
+            self,
+            Self::Bool
+                | Self::I32
+                | Self::U32
+                | Self::I64
+                | Self::U64
+                | Self::F32
+                | Self::F64
+                | Self::String
+        )
+    }
+
     /// The kind of that name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
+}
+
+/// The place of a number: ascends with it, and is one for both zeros.
+pub(crate) fn place(number: f64) -> u64 {
+    let bits = (number + 0.0).to_bits();
+    if bits >> 63 == 1 {
+        !bits
+    } else {
+        bits | 1 << 63
+    }
+}
+
+/// The hash of a name or text.
+pub(crate) fn hash(text: &str) -> u64 {
+    let mut hasher = rustc_hash::FxHasher::default();
+    hasher.write(text.as_bytes());
+    hasher.finish()
 }
 
 impl fmt::Display for ValueKind {
@@ -168,6 +201,15 @@ impl Value {
             Self::F32(n) => Some(f64::from(n)),
             Self::F64(n) => Some(n),
             _ => None,
+        }
+    }
+
+    /// Where an index has the value: numbers ascend, equal values have equal places, and a text's
+    /// place is its hash. `None` for kinds that cannot have an index.
+    pub(crate) fn place(&self) -> Option<u64> {
+        match self {
+            Self::String(text) => Some(hash(text)),
+            other => other.as_f64().map(place),
         }
     }
 

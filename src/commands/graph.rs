@@ -386,7 +386,7 @@ fn describe(snapshot: &Snapshot, change: &dsr::Change) -> String {
     let sign = |touch| match touch {
         dsr::Touch::Created => "+",
         dsr::Touch::Deleted => "-",
-        dsr::Touch::Updated => "",
+        dsr::Touch::Updated | dsr::Touch::Replaced => "",
     };
     let mut parts = Vec::new();
     for rule in &change.rules {

@@ -73,7 +73,7 @@ impl Segment for Box<[Word]> {
 }
 
 pub(crate) const MAGIC: u64 = u64::from_le_bytes(*b"cortexG1");
-pub(crate) const FORMAT: u64 = 1;
+pub(crate) const FORMAT: u64 = 2;
 
 /// Header words of segment 0.
 mod at {
@@ -114,6 +114,10 @@ pub(crate) struct Root {
     pub(crate) node_count: u64,
     pub(crate) edge_count: u64,
     pub(crate) next_id: u64,
+    /// Tree from (label, type of source, type of target) to how many edges are such.
+    pub(crate) triples: Address,
+    /// Directory by attribute with an index: tree of (value's place in the order, node id), count.
+    pub(crate) values: Address,
 }
 
 impl Root {
@@ -134,11 +138,13 @@ impl Root {
             node_count,
             edge_count,
             next_id,
+            triples,
+            values,
             ..
         } = self;
         let time = time.cast_unsigned();
         let mut words = [0; ROOT_WORDS];
-        words[..12].copy_from_slice(&[
+        words[..14].copy_from_slice(&[
             version,
             time,
             nodes,
@@ -151,6 +157,8 @@ impl Root {
             node_count,
             edge_count,
             next_id,
+            triples,
+            values,
         ]);
         words
     }
@@ -169,6 +177,7 @@ impl Root {
             ..,
         ] = words;
         let [node_count, edge_count, next_id] = [words[9], words[10], words[11]];
+        let [triples, values] = [words[12], words[13]];
         let time = time.cast_signed();
         Self {
             version,
@@ -183,6 +192,8 @@ impl Root {
             node_count,
             edge_count,
             next_id,
+            triples,
+            values,
         }
     }
 

@@ -10,6 +10,7 @@
 //! - Directory: length, then (tree, count) per id.
 
 use super::allocator::Full;
+use super::tree::Key;
 use super::{Address, Arena, Word};
 use crate::graph::Writer;
 use crate::value::{Pose, Value, ValueKind};
@@ -19,6 +20,14 @@ pub(crate) const NODE_HEADER: usize = 6;
 pub(crate) const EDGE_HEADER: usize = 4;
 const ATTRIBUTE_HEADER: usize = 3;
 const ADDRESS_MASK: u64 = (1 << 48) - 1;
+
+/// The key under which edges of a label between nodes of these exact types are counted.
+pub(crate) fn triple(label: u16, from: u16, to: u16) -> Key {
+    [
+        u64::from(label) << 32 | u64::from(from) << 16 | u64::from(to),
+        0,
+    ]
+}
 
 /// One row of a record's attribute table.
 pub(crate) fn row(attribute: u16, address: Address) -> u64 {

@@ -65,10 +65,12 @@ fn touch<K: Ord, V>(
         std::collections::btree_map::Entry::Occupied(mut entry) => {
             let (known, before, attributes) = entry.get_mut();
             *known = value;
-            // Made and changed is made; gone and made again is changed.
+            // Made and changed is made; gone and made again is another.
             *before = match (*before, how) {
-                (Touch::Created, Touch::Updated) => Touch::Created,
-                (Touch::Deleted, Touch::Created) => Touch::Updated,
+                (Touch::Created, Touch::Updated | Touch::Replaced) => Touch::Created,
+                (Touch::Deleted, Touch::Created) | (Touch::Replaced, Touch::Updated) => {
+                    Touch::Replaced
+                }
                 (_, later) => later,
             };
             if let Some(what) = what
@@ -319,6 +321,7 @@ impl<'a> Work<'a> {
                     unit: None,
                     min: None,
                     max: None,
+                    index: false,
                 };
                 Ok(schema.add_attribute(attribute)?)
             }

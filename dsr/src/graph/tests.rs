@@ -1,8 +1,11 @@
 //! The graph against a naive model of it: whatever transactions come, every version that can still
 //! be read says what the model said at that version, and a refused transaction changes nothing.
 
+mod indices;
+
 use super::*;
 use crate::{EdgeKey, EdgeRef, Owner, ReadError, Value};
+use indices::{indices, triples, valued, with_indices};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 
@@ -140,6 +143,10 @@ impl Model {
         assert_eq!(by_label, outgoing);
         assert_eq!(outgoing, incoming);
         assert_eq!(outgoing.len() as u64, snapshot.edge_count());
+        assert_eq!(
+            indices(snapshot)?,
+            (valued(snapshot)?, triples(snapshot, &outgoing)?)
+        );
         for key in outgoing {
             let name = |id| {
                 snapshot
@@ -221,7 +228,7 @@ proptest! {
         transactions in prop::collection::vec(prop::collection::vec(operation(), 1..5), 1..200),
         history_bytes in prop_oneof![Just(0), Just(20_000), Just(64 << 20)],
     ) {
-        let mut graph = Graph::in_memory(Schema::open());
+        let mut graph = Graph::in_memory(with_indices());
         graph.set_limits(Limits { history_bytes });
         let mut model = Model::default();
         let mut past = vec![(graph.snapshot(), model.clone())];

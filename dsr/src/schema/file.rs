@@ -52,15 +52,18 @@ struct AttributeRow {
     unit: Option<String>,
     min: Option<f64>,
     max: Option<f64>,
+    index: Option<Spanned<bool>>,
 }
 
 impl Schema {
     /// Reads a schema file: `types` maps each type to its parents, `labels` each label to the
     /// types it may start `from` and end at (`to`), `attributes` each attribute to its `kind`
-    /// (see [`ValueKind::name`]), `unit`, `min` and `max`. `open = true` lets other names in.
+    /// (see [`ValueKind::name`]), `unit`, `min`, `max` and `index`. `open = true` lets other names
+    /// in.
     ///
     /// # Errors
-    /// Broken TOML, an unknown key, kind or type name; with its place in the file.
+    /// Broken TOML, an unknown key, kind or type name, an index of what has no order and is no
+    /// text; with its place in the file.
     pub fn from_toml(file_name: &str, text: &str) -> Result<Self, SchemaFileError> {
         let error = |message: String, span: Option<std::ops::Range<usize>>, help| SchemaFileError {
             message,
@@ -128,12 +131,19 @@ impl Schema {
                     Some(format!("one of {known}")),
                 )
             })?;
+            let index = row.index.as_ref().is_some_and(|index| *index.get_ref());
+            if let Some(asked) = row.index.filter(|_| index && !kind.can_have_index()) {
+                let message = format!("a {} cannot have an index", kind.name());
+                let help = "numbers, bools and strings can".to_owned();
+                return Err(error(message, Some(asked.span()), Some(help)));
+            }
             let attribute = AttributeType {
                 name: name.get_ref().clone(),
                 kind: Some(kind),
                 unit: row.unit,
                 min: row.min,
                 max: row.max,
+                index,
             };
             schema
                 .add_attribute(attribute)
@@ -165,6 +175,15 @@ mod tests {
     fn a_circle_of_types_is_refused() {
         let (message, _) = place_of("[types]\na = [\"b\"]\nb = [\"a\"]\n");
         assert!(message.contains("its own ancestor"), "{message}");
+    }
+
+    #[test]
+    fn an_index_of_what_cannot_have_one_is_pointed_at() {
+        let (message, place) = place_of("[attributes]\nx = { kind = \"pose\", index = true }\n");
+        assert_eq!(
+            (message.as_str(), place.as_str()),
+            ("a pose cannot have an index", "true")
+        );
     }
 
     #[test]

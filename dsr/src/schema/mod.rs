@@ -45,6 +45,8 @@ pub struct AttributeType {
     pub min: Option<f64>,
     /// The largest number it may hold.
     pub max: Option<f64>,
+    /// Whether the graph keeps an index of the nodes by its value.
+    pub index: bool,
 }
 
 /// The names a graph may use.
@@ -145,6 +147,12 @@ impl Schema {
     /// The attribute of that name.
     pub fn find_attribute(&self, name: &str) -> Option<AttributeId> {
         self.attribute_ids.get(name).copied()
+    }
+
+    /// Whether the graph keeps an index of the nodes by the attribute's value.
+    pub fn has_index(&self, attribute: AttributeId) -> bool {
+        let known = self.parts.attributes.get(usize::from(attribute.0));
+        known.is_some_and(|attribute| attribute.index)
     }
 
     /// A type's name.

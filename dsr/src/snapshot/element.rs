@@ -1,7 +1,7 @@
 //! The nodes, edges and attributes of a snapshot. As every read of a snapshot, theirs are genuine or
 //! say [`ReadError::SnapshotTooOld`].
 
-use super::{Scan, Snapshot};
+use super::{NodeIds, Scan, Snapshot};
 use crate::arena::record::{self, AttributeRecord, EdgeRecord};
 use crate::arena::{Address, ReadError, Word};
 use crate::{AttributeId, EdgeKey, LabelId, NodeId, Time, TypeId, Value, Version, WriterId};
@@ -188,6 +188,22 @@ impl<'a> Node<'a> {
                 to: NodeId(to),
             })
         })
+    }
+
+    /// Where the edges of a label that start here end, by ascending id.
+    pub fn targets_of(&self, label: LabelId) -> NodeIds<'a> {
+        NodeIds {
+            scan: self.adjacent(4, [label.0; 2]),
+            word: 1,
+        }
+    }
+
+    /// Where the edges of a label that end here start, by ascending id.
+    pub fn sources_of(&self, label: LabelId) -> NodeIds<'a> {
+        NodeIds {
+            scan: self.adjacent(5, [label.0; 2]),
+            word: 1,
+        }
     }
 
     /// The edges that end here, by label and source.

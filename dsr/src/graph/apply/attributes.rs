@@ -1,7 +1,7 @@
 //! What a commit under way does to attributes. It guarantees that each written one passes the schema and
-//! remembers version, time and writer.
+//! remembers version, time and writer, and that indices have what the nodes have.
 
-use super::{Work, touch};
+use super::{Work, read, touch};
 use crate::arena::Address;
 use crate::arena::record::{AttributeRecord, row, split_row};
 use crate::{AttributeId, NodeId, Owner, Refusal, Touch, TypeId, Value};
@@ -10,6 +10,42 @@ impl Work<'_> {
     pub(super) fn retire_attribute(&mut self, address: Address) {
         let words = AttributeRecord::len(&self.graph.writer.arena, address);
         self.graph.writer.retire(address, words);
+    }
+
+    /// The place in its index of an attribute in a node's table, where it has one.
+    pub(super) fn indexed_place(&self, rows: &[u64], name: &str) -> Result<Option<u64>, Refusal> {
+        let attribute = self.schema().find_attribute(name);
+        let Some(attribute) = attribute.filter(|&found| self.schema().has_index(found)) else {
+            return Ok(None);
+        };
+        let row = rows.iter().find(|&&row| split_row(row).0 == attribute.0);
+        row.map_or(Ok(None), |&row| self.place_of(row))
+    }
+
+    /// The place of a row's value in an index.
+    pub(super) fn place_of(&self, row: u64) -> Result<Option<u64>, Refusal> {
+        let record = AttributeRecord::read(&self.graph.writer.arena, split_row(row).1);
+        Ok(read(record)?.value.place())
+    }
+
+    /// Moves a node in the index of an attribute, if that has one.
+    pub(super) fn index_value(
+        &mut self,
+        attribute: AttributeId,
+        id: NodeId,
+        before: Option<u64>,
+        after: Option<u64>,
+    ) -> Result<(), Refusal> {
+        if before == after || !self.schema().has_index(attribute) {
+            return Ok(());
+        }
+        for (place, member) in [(before, false), (after, true)] {
+            if let Some(place) = place {
+                let directory = self.root.values;
+                self.root.values = self.index(directory, attribute.0, [place, id.0], member)?;
+            }
+        }
+        Ok(())
     }
 
     /// Writes an attribute and enters it into a record's table.
@@ -50,7 +86,10 @@ impl Work<'_> {
             Owner::Node(node) => {
                 let (address, mut record) = self.node(node)?;
                 let len = record.words().len();
+                let before = self.indexed_place(&record.rows, name)?;
                 let name = self.change_row(&mut record.rows, name, value)?;
+                let after = value.and_then(Value::place);
+                self.index_value(name, NodeId(record.id), before, after)?;
                 record.version = self.stamp.record;
                 self.put_node(Some((address, len)), &record)?;
                 let type_id = TypeId(record.type_id);

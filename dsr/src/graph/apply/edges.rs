@@ -1,10 +1,10 @@
-//! What a commit under way does to edges. It guarantees that both ends of an edge and the edges of its
-//! label agree on which there are.
+//! What a commit under way does to edges. It guarantees that both ends of an edge, the edges of its
+//! label and the counts per (label, type, type) agree on which there are.
 
 use super::{Work, read, touch};
-use crate::arena::record::{EdgeRecord, split_row};
+use crate::arena::record::{self, EdgeRecord, split_row};
 use crate::arena::{Address, tree};
-use crate::{EdgeKey, EdgeRef, NodeId, Refusal, Touch, TypeId, Value};
+use crate::{EdgeKey, EdgeRef, LabelId, NodeId, Refusal, Touch, TypeId, Value};
 
 impl Work<'_> {
     pub(super) fn find_edge(&self, edge: &EdgeRef) -> Result<Option<(EdgeKey, Address)>, Refusal> {
@@ -80,6 +80,7 @@ impl Work<'_> {
             let directory = self.root.labels;
             self.root.labels = self.index(directory, label.0, [key.from.0, key.to.0], true)?;
             self.root.edge_count += 1;
+            self.count_triple(label, [from.type_id, to.type_id], true)?;
         }
         Ok(())
     }
@@ -111,6 +112,7 @@ impl Work<'_> {
     pub(super) fn delete_edge(&mut self, key: EdgeKey) -> Result<(), Refusal> {
         let label = u64::from(key.label.0);
         let (address, mut from) = self.node(&key.from.into())?;
+        let from_type = from.type_id;
         let found = tree::find(&self.graph.writer.arena, from.out, [label, key.to.0]);
         if let Some(edge) = read(found)? {
             let record = read(EdgeRecord::read(&self.graph.writer.arena, edge))?;
@@ -131,7 +133,31 @@ impl Work<'_> {
         let directory = self.root.labels;
         self.root.labels = self.index(directory, key.label.0, [key.from.0, key.to.0], false)?;
         self.root.edge_count -= 1;
+        self.count_triple(key.label, [from_type, to.type_id], false)?;
         touch(&mut self.edges, key, (), Touch::Deleted, None);
+        Ok(())
+    }
+
+    /// Counts an edge of these types more, or less.
+    pub(super) fn count_triple(
+        &mut self,
+        label: LabelId,
+        [from, to]: [u16; 2],
+        more: bool,
+    ) -> Result<(), Refusal> {
+        let key = record::triple(label.0, from, to);
+        let triples = self.root.triples;
+        let writer = &mut self.graph.writer;
+        let count = read(tree::find(writer.arena(), triples, key))?.unwrap_or(0);
+        let triples = match if more {
+            count + 1
+        } else {
+            count.saturating_sub(1)
+        } {
+            0 => tree::remove(writer, triples, key),
+            count => tree::insert(writer, triples, key, count),
+        };
+        self.root.triples = self.room(triples)?;
         Ok(())
     }
 }

@@ -4,8 +4,8 @@
 use super::{Work, damaged, read, touch};
 use crate::arena::record::{self, NodeRecord, split_row};
 use crate::arena::{Address, tree, trie};
-use crate::snapshot::name_hash;
-use crate::{NodeId, NodeRef, Refusal, SchemaError, Touch, TypeId, Value};
+use crate::value::hash;
+use crate::{AttributeId, NodeId, NodeRef, Refusal, SchemaError, Touch, TypeId, Value};
 
 impl Work<'_> {
     pub(super) fn find(&self, node: &NodeRef) -> Result<Option<NodeId>, Refusal> {
@@ -80,7 +80,9 @@ impl Work<'_> {
         };
         touch(&mut self.nodes, id, type_id, Touch::Created, None);
         for (name, value) in attributes {
+            let before = self.indexed_place(&node.rows, name)?;
             let name = self.set_row(&mut node.rows, name, value)?;
+            self.index_value(name, id, before, value.place())?;
             touch(&mut self.nodes, id, type_id, Touch::Updated, Some(name));
         }
         let blob = record::write_blob(&mut self.graph.writer, name.as_bytes());
@@ -89,7 +91,7 @@ impl Work<'_> {
         let names = tree::insert(
             &mut self.graph.writer,
             self.root.names,
-            [name_hash(name), id.0],
+            [hash(name), id.0],
             0,
         );
         self.root.names = self.room(names)?;
@@ -143,10 +145,15 @@ impl Work<'_> {
         }
         let (address, node) = self.node(&id.into())?;
         for &row in &node.rows {
+            let attribute = AttributeId(split_row(row).0);
+            if self.schema().has_index(attribute) {
+                let place = self.place_of(row)?;
+                self.index_value(attribute, id, place, None)?;
+            }
             self.retire_attribute(split_row(row).1);
         }
         let name = read(record::read_blob(&self.graph.writer.arena, node.name))?;
-        let hash = name_hash(&String::from_utf8_lossy(&name));
+        let hash = hash(&String::from_utf8_lossy(&name));
         let writer = &mut self.graph.writer;
         let words = record::blob_len(writer.arena(), node.name);
         writer.retire(node.name, words);
@@ -171,13 +178,48 @@ impl Work<'_> {
         let type_id = self.type_id(type_name)?;
         let (address, mut node) = self.node(node)?;
         let id = NodeId(node.id);
+        if type_id.0 == node.type_id {
+            return Ok(());
+        }
         self.index_type(TypeId(node.type_id), id, false)?;
         self.index_type(type_id, id, true)?;
+        self.recount_triples(id, TypeId(node.type_id), type_id)?;
         let len = node.words().len();
         node.type_id = type_id.0;
         node.version = self.stamp.record;
         self.put_node(Some((address, len)), &node)?;
-        touch(&mut self.nodes, id, type_id, Touch::Updated, None);
+        touch(&mut self.nodes, id, type_id, Touch::Replaced, None);
+        Ok(())
+    }
+
+    /// Moves what is counted of the node's edges from one type to another.
+    fn recount_triples(&mut self, id: NodeId, old: TypeId, new: TypeId) -> Result<(), Refusal> {
+        let edges = {
+            let snapshot = self.snapshot();
+            let node = snapshot.find_node(id).map_err(damaged)?;
+            let edges = node.iter().flat_map(|node| {
+                let into = node
+                    .in_edges()
+                    .filter(|key| !matches!(key, Ok(key) if key.from == id));
+                node.out_edges().chain(into)
+            });
+            edges.collect::<Result<Vec<_>, _>>().map_err(damaged)?
+        };
+        for key in edges {
+            let other = if key.from == id { key.to } else { key.from };
+            let other = if other == id {
+                None
+            } else {
+                Some(self.node(&other.into())?.1.type_id)
+            };
+            let ends = |this: TypeId| match other {
+                None => [this.0, this.0],
+                Some(other) if key.from == id => [this.0, other],
+                Some(other) => [other, this.0],
+            };
+            self.count_triple(key.label, ends(old), false)?;
+            self.count_triple(key.label, ends(new), true)?;
+        }
         Ok(())
     }
 }
