@@ -428,11 +428,8 @@ fn number(node: &dsr::Node<'_>, attribute: &str) -> Result<f64, ReadError> {
 
 /// The missions in the graph, by id.
 fn missions(snapshot: &Snapshot) -> Result<Vec<MissionState>, ReadError> {
-    let Some(kind) = snapshot.schema().find_type("mission") else {
-        return Ok(Vec::new());
-    };
     snapshot
-        .nodes_of_type(kind)
+        .nodes_of("mission")
         .map(|node| {
             let node = node?;
             Ok(MissionState {
@@ -448,13 +445,11 @@ fn missions(snapshot: &Snapshot) -> Result<Vec<MissionState>, ReadError> {
 
 /// The steps of all plans in the graph, by id: in the order in which they were planned.
 fn steps(snapshot: &Snapshot) -> Result<Vec<StepState>, ReadError> {
-    let schema = snapshot.schema();
-    let (Some(kind), Some(label)) = (schema.find_type("step"), schema.find_label("has_step"))
-    else {
+    let Some(label) = snapshot.schema().find_label("has_step") else {
         return Ok(Vec::new());
     };
     snapshot
-        .nodes_of_type(kind)
+        .nodes_of("step")
         .map(|node| {
             let node = node?;
             let mission = match node.in_edges_of(label).next().transpose()? {

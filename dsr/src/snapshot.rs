@@ -164,6 +164,18 @@ impl Snapshot {
             .flat_map(move |&exact| self.nodes_of_exact_type(exact))
     }
 
+    /// The nodes of the type of that name or its subtypes, as [`Snapshot::nodes_of_type`]; none
+    /// where the schema does not have it.
+    pub fn nodes_of(
+        &self,
+        type_name: &str,
+    ) -> impl Iterator<Item = Result<Node<'_>, ReadError>> + use<'_> {
+        self.schema
+            .find_type(type_name)
+            .into_iter()
+            .flat_map(|type_id| self.nodes_of_type(type_id))
+    }
+
     fn nodes_of_exact_type(
         &self,
         exact: TypeId,

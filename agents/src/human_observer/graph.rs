@@ -10,8 +10,7 @@
 use super::{Config, Object, Observer, Scene, Shape, Surroundings, TrackedPerson};
 use crate::messages::CameraFrame;
 use crate::perception::graph::{
-    Difference, LAST_SEEN_PERIOD, first_of_type, floor_plan, nodes_of_type, number, numbers,
-    points, targets,
+    Difference, LAST_SEEN_PERIOD, first_of_type, floor_plan, number, numbers, points, targets,
 };
 use dsr::{Node, ReadError, Snapshot, Time, Transaction, Value};
 use nalgebra::Vector2;
@@ -48,7 +47,7 @@ pub fn surroundings(snapshot: &Snapshot) -> Result<Surroundings, ReadError> {
         None => None,
     };
     let mut objects = Vec::new();
-    for node in nodes_of_type(snapshot, "object") {
+    for node in snapshot.nodes_of("object") {
         let node = node?;
         if let Some(world_from_object) = snapshot.world_from(node.id())? {
             objects.push(object(&node, world_from_object)?);
@@ -125,7 +124,7 @@ pub fn people(snapshot: &Snapshot) -> Result<Vec<TrackedPerson>, ReadError> {
 /// leaves alone.
 fn person_nodes(snapshot: &Snapshot) -> Result<PersonNodes<'_>, ReadError> {
     let (mut own, mut foreign) = (BTreeMap::new(), BTreeSet::new());
-    for node in nodes_of_type(snapshot, "person") {
+    for node in snapshot.nodes_of("person") {
         let node = node?;
         let name = node.name()?;
         match person_id(&name) {

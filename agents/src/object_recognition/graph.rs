@@ -8,7 +8,7 @@
 use super::{Config, RecognizedObject, Recognizer};
 use crate::messages::CameraFrame;
 use crate::perception::graph::{
-    Difference, LAST_SEEN_PERIOD, floor_plan, nodes_of_type, number, numbers, targets,
+    Difference, LAST_SEEN_PERIOD, floor_plan, number, numbers, targets,
 };
 use dsr::{Node, ReadError, Schema, Snapshot, Time, Transaction};
 use nalgebra::Vector2;
@@ -62,7 +62,8 @@ pub fn objects(snapshot: &Snapshot) -> Result<Vec<RecognizedObject>, ReadError> 
 }
 
 fn object_nodes(snapshot: &Snapshot) -> Result<BTreeMap<String, Node<'_>>, ReadError> {
-    nodes_of_type(snapshot, "object")
+    snapshot
+        .nodes_of("object")
         .map(|node| {
             let node = node?;
             Ok((node.name()?, node))

@@ -21,7 +21,7 @@ pub(crate) const LAST_SEEN_PERIOD: f64 = 0.5;
 /// [`ReadError`].
 pub(crate) fn floor_plan(snapshot: &Snapshot) -> Result<FloorPlan, ReadError> {
     let mut rooms = Vec::new();
-    for room in nodes_of_type(snapshot, "room") {
+    for room in snapshot.nodes_of("room") {
         let room = room?;
         rooms.push((room.name()?, points(&room, "polygon")?));
     }
@@ -36,17 +36,6 @@ pub(crate) fn floor_plan(snapshot: &Snapshot) -> Result<FloorPlan, ReadError> {
     Ok(FloorPlan::new(rooms, walls))
 }
 
-/// The nodes of the type of that name, none where the schema does not have it.
-pub(crate) fn nodes_of_type<'a>(
-    snapshot: &'a Snapshot,
-    type_name: &str,
-) -> impl Iterator<Item = Result<Node<'a>, ReadError>> + use<'a> {
-    let type_id = snapshot.schema().find_type(type_name);
-    type_id
-        .into_iter()
-        .flat_map(|type_id| snapshot.nodes_of_type(type_id))
-}
-
 /// The node of that type with the least id.
 ///
 /// # Errors
@@ -56,7 +45,7 @@ pub(crate) fn first_of_type<'a>(
     type_name: &str,
 ) -> Result<Option<Node<'a>>, ReadError> {
     let mut first: Option<Node<'a>> = None;
-    for node in nodes_of_type(snapshot, type_name) {
+    for node in snapshot.nodes_of(type_name) {
         let node = node?;
         if first.is_none_or(|known| node.id() < known.id()) {
             first = Some(node);

@@ -256,8 +256,7 @@ pub(crate) fn edges(snapshot: &Snapshot, label: &str) -> Vec<(String, String)> {
 
 /// The names of the nodes of a type, in order.
 pub(crate) fn names(snapshot: &Snapshot, type_name: &str) -> Vec<String> {
-    let type_id = snapshot.schema().type_id(type_name).unwrap();
-    let nodes = snapshot.nodes_of_type(type_id);
+    let nodes = snapshot.nodes_of(type_name);
     let mut names: Vec<_> = nodes.map(|node| node.unwrap().name().unwrap()).collect();
     names.sort_unstable();
     names

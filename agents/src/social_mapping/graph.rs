@@ -66,17 +66,6 @@ pub enum StepError {
     Scene(#[from] SceneError),
 }
 
-/// The nodes of a type and its subtypes; none where the schema does not know the type.
-fn nodes<'a>(
-    snapshot: &'a Snapshot,
-    type_name: &str,
-) -> impl Iterator<Item = Result<Node<'a>, dsr::ReadError>> + use<'a> {
-    let type_id = snapshot.schema().find_type(type_name);
-    type_id
-        .into_iter()
-        .flat_map(|type_id| snapshot.nodes_of_type(type_id))
-}
-
 /// A number that may be absent, but if it is there must be one: NaN otherwise, which the mapper
 /// reports.
 fn number(node: &Node<'_>, name: &str, absent: f64) -> Result<f64, dsr::ReadError> {
@@ -105,7 +94,7 @@ fn vector(node: &Node<'_>, name: &str, absent: f64) -> Result<Vector2<f64>, dsr:
 /// [`ReadError`]: without a world with `bounds` and well-formed `walls`, and a robot with a `radius`,
 /// there is no map.
 pub fn scene(snapshot: &Snapshot) -> Result<SocialScene, ReadError> {
-    let world = nodes(snapshot, "world").next().transpose()?;
+    let world = snapshot.nodes_of("world").next().transpose()?;
     let world = world.ok_or(ReadError::Missing { type_name: "world" })?;
     let mut scene = SocialScene {
         bounds: bounds(&world)?,
@@ -118,7 +107,7 @@ pub fn scene(snapshot: &Snapshot) -> Result<SocialScene, ReadError> {
         ..SocialScene::default()
     };
     let mut names: BTreeMap<NodeId, String> = BTreeMap::new();
-    for node in nodes(snapshot, "person") {
+    for node in snapshot.nodes_of("person") {
         let node = node?;
         let Some(world_from_person) = snapshot.world_from(node.id())? else {
             continue;
@@ -131,7 +120,7 @@ pub fn scene(snapshot: &Snapshot) -> Result<SocialScene, ReadError> {
             radius: number(&node, "radius", BODY_RADIUS)?,
         });
     }
-    for node in nodes(snapshot, "object") {
+    for node in snapshot.nodes_of("object") {
         let node = node?;
         let Some(world_from_object) = snapshot.world_from(node.id())? else {
             continue;
@@ -201,7 +190,7 @@ fn walls(world: &Node<'_>) -> Result<Vec<Wall>, ReadError> {
 
 fn robot_radius(snapshot: &Snapshot) -> Result<f64, ReadError> {
     let mut largest: Option<f64> = None;
-    for robot in nodes(snapshot, "robot") {
+    for robot in snapshot.nodes_of("robot") {
         let robot = robot?;
         let radius = robot.value("radius")?.and_then(|value| value.as_f64());
         let radius = radius.ok_or_else(|| attribute_error(&robot, "radius", "a number"))?;
@@ -213,7 +202,7 @@ fn robot_radius(snapshot: &Snapshot) -> Result<f64, ReadError> {
 
 fn read_activities(snapshot: &Snapshot, scene: &mut SocialScene) -> Result<(), ReadError> {
     let uses = snapshot.schema().find_label("uses");
-    for node in nodes(snapshot, "activity") {
+    for node in snapshot.nodes_of("activity") {
         let node = node?;
         let (start, end) = (
             number(&node, "start", f64::NAN)?,
@@ -259,7 +248,7 @@ pub fn transaction(update: &Update, snapshot: &Snapshot) -> Result<Transaction, 
         .iter()
         .map(|person| (person.name.as_str(), person))
         .collect();
-    for node in nodes(snapshot, "person") {
+    for node in snapshot.nodes_of("person") {
         let node = node?;
         match people.get(node.name()?.as_str()) {
             Some(person) => write_zones(&mut transaction, &node, person)?,
@@ -271,7 +260,7 @@ pub fn transaction(update: &Update, snapshot: &Snapshot) -> Result<Transaction, 
         .iter()
         .map(|object| (object.name.as_str(), object))
         .collect();
-    for node in nodes(snapshot, "object") {
+    for node in snapshot.nodes_of("object") {
         let node = node?;
         match objects.get(node.name()?.as_str()) {
             Some(object) => write_use(&mut transaction, &node, object)?,

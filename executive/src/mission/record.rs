@@ -173,11 +173,8 @@ fn count(node: &Node, name: &str) -> Result<u64, ReadError> {
 
 /// All missions, without their steps, by ascending id.
 pub(crate) fn missions(snapshot: &Snapshot) -> Result<Vec<Mission>, ReadError> {
-    let Some(type_id) = snapshot.schema().find_type("mission") else {
-        return Ok(Vec::new());
-    };
     let mut missions = Vec::new();
-    for node in snapshot.nodes_of_type(type_id) {
+    for node in snapshot.nodes_of("mission") {
         let node = node?;
         let status = text(&node, "status")?;
         let known = MissionStatus::ALL

@@ -98,17 +98,6 @@ pub enum StepError {
     },
 }
 
-/// The nodes of a type and its subtypes; none where the schema does not know the type.
-fn nodes<'a>(
-    snapshot: &'a Snapshot,
-    type_name: &str,
-) -> impl Iterator<Item = Result<Node<'a>, ReadError>> + use<'a> {
-    let type_id = snapshot.schema().find_type(type_name);
-    type_id
-        .into_iter()
-        .flat_map(|type_id| snapshot.nodes_of_type(type_id))
-}
-
 fn number(node: &Node, name: &str) -> Result<Option<f64>, ReadError> {
     Ok(node
         .value(name)?
@@ -145,20 +134,20 @@ fn place_of(snapshot: &Snapshot, node: NodeId) -> Result<Option<Isometry2<f64>>,
 
 /// Reads the world; `None` while there is no world or no robot in the graph.
 pub(super) fn world(snapshot: &Snapshot, now: Time) -> Result<Option<World>, ReadError> {
-    let Some(world) = nodes(snapshot, "world").next().transpose()? else {
+    let Some(world) = snapshot.nodes_of("world").next().transpose()? else {
         return Ok(None);
     };
-    let Some(robot) = nodes(snapshot, "robot").next().transpose()? else {
+    let Some(robot) = snapshot.nodes_of("robot").next().transpose()? else {
         return Ok(None);
     };
     let walls = numbers(&world, "walls")?;
     let walls = walls.as_chunks::<4>().0.iter();
     let mut people = Vec::new();
-    for node in nodes(snapshot, "person") {
+    for node in snapshot.nodes_of("person") {
         people.extend(person(snapshot, &node?, now)?);
     }
     let mut rooms = Vec::new();
-    for node in nodes(snapshot, "room") {
+    for node in snapshot.nodes_of("room") {
         let node = node?;
         let polygon = numbers(&node, "polygon")?;
         let corners = polygon.as_chunks::<2>().0.iter();
@@ -228,7 +217,7 @@ fn person(snapshot: &Snapshot, node: &Node, now: Time) -> Result<Option<Person>,
 /// The step that navigation is to carry out: one that is running, else the first dispatched.
 pub(super) fn step(snapshot: &Snapshot) -> Result<Option<Step>, ReadError> {
     let mut best: Option<Step> = None;
-    for node in nodes(snapshot, "step") {
+    for node in snapshot.nodes_of("step") {
         let node = node?;
         let running = match text(&node, "status")?.as_deref() {
             Some("running") => true,
