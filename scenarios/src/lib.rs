@@ -6,6 +6,7 @@
 //! of scenario, seed and inputs.
 #![forbid(unsafe_code)]
 
+pub mod grid_file;
 mod initial_graph;
 pub mod metrics;
 pub mod picture;

@@ -3,6 +3,7 @@
 mod agent;
 mod graph;
 mod output;
+mod path;
 mod plan;
 mod rules;
 mod run;
@@ -28,6 +29,7 @@ pub(crate) fn perform(verb: Verb) -> Result<Answer, Failure> {
         Verb::Graph(arguments) => graph::run(&arguments),
         Verb::Rules(arguments) => rules::run(&arguments),
         Verb::Plan(arguments) => plan::run(&arguments),
+        Verb::Path(arguments) => path::run(&arguments),
     }
 }
 

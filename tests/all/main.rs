@@ -10,6 +10,7 @@ mod dependencies;
 mod documentation;
 mod examples;
 mod graph;
+mod path;
 mod plan;
 mod rules;
 mod run;

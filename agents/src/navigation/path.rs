@@ -377,6 +377,15 @@ pub(super) fn free_cells_near(grid: &CostGrid, cell: Cell, tolerance: f64) -> Ve
     near.into_iter().map(|(_, cell)| cell).collect()
 }
 
+/// The length of `cells` in cells: 1 for a straight step, sqrt 2 for a diagonal one.
+pub fn length_of(cells: &[Cell]) -> f64 {
+    let diagonal = |step: &[Cell]| step[0].0 != step[1].0 && step[0].1 != step[1].1;
+    let steps = cells.windows(2);
+    steps
+        .map(|step| if diagonal(step) { SQRT_2 } else { 1.0 })
+        .sum()
+}
+
 /// The cost of walking `cells` on `grid` under `model`, infinite where a step is not allowed; so a
 /// path found earlier can be judged on the grid as it is now.
 ///
