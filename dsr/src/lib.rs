@@ -37,7 +37,9 @@ pub use shm::{
     AttachError, Changes, ClockError, CommitError, Instance, InstanceError, Publisher, Session,
     Store, StoreError, Subscriber, Tick, Update,
 };
-pub use snapshot::{Attribute, Edge, Node, NodeIds, Snapshot, TripleCount, ValueRange};
+pub use snapshot::{
+    Attribute, Edge, Edges, Element, Neighbors, Node, NodeIds, Snapshot, TripleCount, ValueRange,
+};
 pub use time::Time;
 pub use transaction::{
     Commit, EdgeRef, NodeRef, Operation, Owner, Precondition, Refusal, Transaction,

@@ -3,8 +3,10 @@
 //! read says [`ReadError::SnapshotTooOld`] and never gives foreign or half-written data.
 
 mod element;
+mod petgraph;
 
-pub use element::{Attribute, Edge, Node};
+pub use element::{Attribute, Edge, Element, Node};
+pub use petgraph::{Edges, Neighbors};
 
 use crate::arena::record;
 use crate::arena::tree::{self, Key};
@@ -15,16 +17,52 @@ use crate::{
     pose_on_floor,
 };
 use nalgebra::Isometry2;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// The graph as of one commit.
 ///
 /// Cheap to clone and to hold; see [`ReadError::SnapshotTooOld`] for how long it can be read.
+///
+/// It has petgraph's traits, so that petgraph's algorithms run on it in place. They have no place for
+/// errors: ask [`Self::check`] afterwards.
+///
+/// ```
+/// use dsr::{Edge, EdgeRef, Graph, Operation, Schema, Time, Transaction};
+/// use petgraph::{algo::dijkstra, visit::EdgeFiltered};
+///
+/// let mut transaction = Transaction::new();
+/// for room in ["hall", "kitchen", "bedroom"] {
+///     transaction.create_node("room", room, vec![]);
+/// }
+/// for (from, to, metres) in [("hall", "kitchen", 4.0), ("kitchen", "bedroom", 3.5)] {
+///     let edge = EdgeRef::new(from, "connected", to);
+///     let attributes = vec![("distance".into(), metres.into())];
+///     transaction.push(Operation::CreateEdge { edge, attributes });
+/// }
+/// let mut graph = Graph::in_memory(Schema::open());
+/// graph.commit(&transaction, "me", Time::default())?;
+///
+/// let snapshot = graph.snapshot();
+/// let hall = snapshot.find_node_by_name("hall")?.unwrap().id();
+/// let bedroom = snapshot.find_node_by_name("bedroom")?.unwrap().id();
+/// let connected = snapshot.schema().label_id("connected")?;
+/// let doors = EdgeFiltered::from_fn(&snapshot, |edge: Edge<'_>| edge.key().label == connected);
+/// let metres = |edge: Edge<'_>| match edge.value("distance") {
+///     Ok(Some(value)) => value.as_f64().unwrap_or(f64::INFINITY),
+///     _ => f64::INFINITY,
+/// };
+/// let distances = dijkstra(&doors, hall, Some(bedroom), metres);
+/// snapshot.check()?;
+/// assert_eq!(distances[&bedroom], 7.5);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Snapshot {
     pub(crate) arena: Arc<Arena>,
     pub(crate) root: Root,
     pub(crate) schema: Arc<Schema>,
+    /// The nodes in order of their ids, once somebody counts them.
+    index: OnceLock<Arc<[NodeId]>>,
 }
 
 /// Which values of an attribute to look for in its index.
@@ -48,6 +86,15 @@ pub struct TripleCount {
 }
 
 impl Snapshot {
+    pub(crate) fn new(arena: Arc<Arena>, root: Root, schema: Arc<Schema>) -> Self {
+        Self {
+            arena,
+            root,
+            schema,
+            index: OnceLock::new(),
+        }
+    }
+
     /// The version that this is the state of.
     pub fn version(&self) -> Version {
         Version(self.root.version)
@@ -88,8 +135,12 @@ impl Snapshot {
     ) -> Result<T, ReadError> {
         match outcome {
             Ok(found) => self.check().map(|()| found),
-            Err(address) => Err(self.arena.broken(self.root.version, address)),
+            Err(address) => Err(self.broken(address)),
         }
+    }
+
+    pub(in crate::snapshot) fn broken(&self, address: Address) -> ReadError {
+        self.arena.broken(self.root.version, address)
     }
 
     fn node_at(&self, address: Address) -> Result<Node<'_>, ReadError> {
@@ -101,12 +152,7 @@ impl Snapshot {
             ))
         };
         let (id, type_id) = self.genuine(read().ok_or(address))?;
-        Ok(Node {
-            snapshot: self,
-            address,
-            id,
-            type_id,
-        })
+        Ok(Node::at(self, address, id, type_id))
     }
 
     /// The node of that id, if it is there.
@@ -306,11 +352,7 @@ impl Snapshot {
             root,
             [u64::from(key.label.0), key.to.0],
         ))?;
-        Ok(found.map(|address| Edge {
-            snapshot: self,
-            address,
-            key,
-        }))
+        Ok(found.map(|address| Edge::at(self, address, key)))
     }
 
     /// The name of an agent that wrote an attribute.

@@ -5,6 +5,7 @@
     reason = "what the tests share ends the test where it cannot go on"
 )]
 
+mod algorithms;
 mod architecture;
 mod dependencies;
 mod documentation;

@@ -179,11 +179,11 @@ impl Graph {
     }
 
     fn snapshot_of(&self, root: Root) -> Snapshot {
-        Snapshot {
-            arena: Arc::clone(&self.writer.arena),
+        Snapshot::new(
+            Arc::clone(&self.writer.arena),
             root,
-            schema: Arc::clone(&self.schema),
-        }
+            Arc::clone(&self.schema),
+        )
     }
 
     /// This life of the store.

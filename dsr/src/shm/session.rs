@@ -307,11 +307,7 @@ impl Session {
                     schema
                 }
             };
-            return Ok(Snapshot {
-                arena: Arc::clone(&arena),
-                root,
-                schema,
-            });
+            return Ok(Snapshot::new(Arc::clone(&arena), root, schema));
         }
     }
 

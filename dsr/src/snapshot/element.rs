@@ -2,25 +2,66 @@
 //! say [`ReadError::SnapshotTooOld`].
 
 use super::{NodeIds, Scan, Snapshot};
-use crate::arena::record::{self, AttributeRecord, EdgeRecord};
+use crate::arena::record::{self, AttributeRecord};
 use crate::arena::{Address, ReadError, Word};
 use crate::{AttributeId, EdgeKey, LabelId, NodeId, Time, TypeId, Value, Version, WriterId};
+use std::ops::Deref;
+
+/// What nodes and edges have in common: a record with a version and a table of attributes.
+#[derive(Debug, Clone, Copy)]
+pub struct Element<'a> {
+    snapshot: &'a Snapshot,
+    address: Address,
+    layout: Layout,
+}
+
+/// Where a record has what.
+#[derive(Debug, Clone, Copy)]
+struct Layout {
+    /// The word with the number of attributes.
+    kind: usize,
+    version: usize,
+    attributes: usize,
+}
+
+const NODE: Layout = Layout {
+    kind: 1,
+    version: 3,
+    attributes: record::NODE_HEADER,
+};
+const EDGE: Layout = Layout {
+    kind: 2,
+    version: 3,
+    attributes: record::EDGE_HEADER,
+};
 
 /// A node of a snapshot.
 #[derive(Debug, Clone, Copy)]
 pub struct Node<'a> {
-    pub(super) snapshot: &'a Snapshot,
-    pub(super) address: Address,
-    pub(super) id: NodeId,
-    pub(super) type_id: TypeId,
+    element: Element<'a>,
+    id: NodeId,
+    type_id: TypeId,
 }
 
 /// An edge of a snapshot.
 #[derive(Debug, Clone, Copy)]
 pub struct Edge<'a> {
-    pub(super) snapshot: &'a Snapshot,
-    pub(super) address: Address,
+    element: Element<'a>,
     pub(super) key: EdgeKey,
+}
+
+impl<'a> Deref for Node<'a> {
+    type Target = Element<'a>;
+    fn deref(&self) -> &Element<'a> {
+        &self.element
+    }
+}
+
+impl<'a> Deref for Edge<'a> {
+    type Target = Element<'a>;
+    fn deref(&self) -> &Element<'a> {
+        &self.element
+    }
 }
 
 /// An attribute as it was last written.
@@ -38,105 +79,63 @@ pub struct Attribute {
     pub writer: WriterId,
 }
 
-/// What nodes and edges have in common: a record with a table of attributes.
-fn find_attribute(
-    snapshot: &Snapshot,
-    rows: Option<&[Word]>,
-    address: Address,
-    name: AttributeId,
-) -> Result<Option<Attribute>, ReadError> {
-    let rows = rows.ok_or_else(|| snapshot.arena.broken(snapshot.root.version, address))?;
-    for word in rows {
-        let (attribute, at) = record::split_row(word.load());
-        if attribute == name.0 {
-            return read_attribute(snapshot, name, at).map(Some);
-        }
-    }
-    snapshot.check().map(|()| None)
-}
-
-fn read_attribute(
-    snapshot: &Snapshot,
-    name: AttributeId,
-    address: Address,
-) -> Result<Attribute, ReadError> {
-    let read = snapshot.genuine(AttributeRecord::read(&snapshot.arena, address))?;
-    Ok(Attribute {
-        name,
-        value: read.value,
-        version: Version(read.version),
-        time: Time::from_nanoseconds(read.time),
-        writer: WriterId(read.writer),
-    })
-}
-
-fn all_attributes(snapshot: &Snapshot, rows: &[u64]) -> Result<Vec<Attribute>, ReadError> {
-    rows.iter()
-        .map(|&row| {
-            let (attribute, address) = record::split_row(row);
-            read_attribute(snapshot, AttributeId(attribute), address)
-        })
-        .collect()
-}
-
-impl<'a> Node<'a> {
-    /// The node's id.
-    pub fn id(&self) -> NodeId {
-        self.id
-    }
-
-    /// The node's type.
-    pub fn type_id(&self) -> TypeId {
-        self.type_id
-    }
-
-    /// The name of the node's type.
-    pub fn type_name(&self) -> &'a str {
-        self.snapshot.schema.type_name(self.type_id)
-    }
-
+impl<'a> Element<'a> {
     pub(super) fn word(&self, index: usize) -> Result<u64, ReadError> {
-        let words = self
-            .snapshot
-            .arena
-            .from(self.address)
-            .and_then(|words| words.get(index));
+        let words = self.snapshot.arena.from(self.address);
+        let word = words.and_then(|words| words.get(index));
         self.snapshot
-            .genuine(words.map(Word::load).ok_or(self.address))
+            .genuine(word.map(Word::load).ok_or(self.address))
     }
 
-    /// The node's name.
-    ///
-    /// # Errors
-    /// [`ReadError`].
-    pub fn name(&self) -> Result<String, ReadError> {
-        let address = self.word(2)?;
-        let bytes = self
-            .snapshot
-            .genuine(record::read_blob(&self.snapshot.arena, address))?;
-        String::from_utf8(bytes).map_err(|_| ReadError::Damaged { address })
-    }
-
-    /// The commit that last changed the node's type or attributes.
+    /// The commit that last changed the attributes or, of a node, the type; or made it.
     ///
     /// # Errors
     /// [`ReadError`].
     pub fn version(&self) -> Result<Version, ReadError> {
-        self.word(3).map(Version)
+        self.word(self.layout.version).map(Version)
     }
 
-    /// One attribute, if the node has it.
+    /// The rows of the table of attributes, not yet known to be genuine.
+    fn rows(&self) -> Result<&'a [Word], ReadError> {
+        let words = self.snapshot.arena.from(self.address);
+        let rows = words.and_then(|words| {
+            let kind = words.get(self.layout.kind)?.load();
+            record::table(words, self.layout.attributes, kind)
+        });
+        rows.ok_or_else(|| self.snapshot.broken(self.address))
+    }
+
+    fn find_row(&self, name: AttributeId) -> Result<Option<Address>, ReadError> {
+        let mut rows = self.rows()?.iter();
+        let row = rows.find_map(|word| {
+            let (attribute, at) = record::split_row(word.load());
+            (attribute == name.0).then_some(at)
+        });
+        self.snapshot.genuine(Ok(row))
+    }
+
+    /// One attribute, if it is there.
     ///
     /// # Errors
     /// [`ReadError`].
     pub fn attribute(&self, name: AttributeId) -> Result<Option<Attribute>, ReadError> {
-        let words = self.snapshot.arena.from(self.address);
-        let rows =
-            words.and_then(|words| record::table(words, record::NODE_HEADER, words.get(1)?.load()));
-        find_attribute(self.snapshot, rows, self.address, name)
+        let row = self.find_row(name)?;
+        row.map(|at| self.read(name, at)).transpose()
     }
 
-    /// The value of the attribute of that name, if the node has it.
+    fn read(&self, name: AttributeId, address: Address) -> Result<Attribute, ReadError> {
+        let read = AttributeRecord::read(&self.snapshot.arena, address);
+        let read = self.snapshot.genuine(read)?;
+        Ok(Attribute {
+            name,
+            value: read.value,
+            version: Version(read.version),
+            time: Time::from_nanoseconds(read.time),
+            writer: WriterId(read.writer),
+        })
+    }
+
+    /// The value of the attribute of that name, if it is there.
     ///
     /// # Errors
     /// [`ReadError`].
@@ -152,19 +151,73 @@ impl<'a> Node<'a> {
     /// # Errors
     /// [`ReadError`].
     pub fn attributes(&self) -> Result<Vec<Attribute>, ReadError> {
-        let record = record::NodeRecord::read(&self.snapshot.arena, self.address);
-        all_attributes(self.snapshot, &self.snapshot.genuine(record)?.rows)
+        let rows: Vec<u64> = self.rows()?.iter().map(Word::load).collect();
+        self.snapshot.check()?;
+        let rows = rows.into_iter().map(record::split_row);
+        rows.map(|(name, at)| self.read(AttributeId(name), at))
+            .collect()
+    }
+}
+
+impl<'a> Node<'a> {
+    pub(super) fn at(
+        snapshot: &'a Snapshot,
+        address: Address,
+        id: NodeId,
+        type_id: TypeId,
+    ) -> Self {
+        let element = Element {
+            snapshot,
+            address,
+            layout: NODE,
+        };
+        Self {
+            element,
+            id,
+            type_id,
+        }
     }
 
-    fn adjacent(self, tree: usize, labels: [u16; 2]) -> Scan<'a> {
+    /// The node's id.
+    pub fn id(&self) -> NodeId {
+        self.id
+    }
+
+    /// The node's type.
+    pub fn type_id(&self) -> TypeId {
+        self.type_id
+    }
+
+    pub(super) fn type_id_ref(&self) -> &TypeId {
+        &self.type_id
+    }
+
+    /// The name of the node's type.
+    pub fn type_name(&self) -> &'a str {
+        self.element.snapshot.schema.type_name(self.type_id)
+    }
+
+    /// The node's name.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn name(&self) -> Result<String, ReadError> {
+        let address = self.word(2)?;
+        let snapshot = self.element.snapshot;
+        let bytes = snapshot.genuine(record::read_blob(&snapshot.arena, address))?;
+        String::from_utf8(bytes).map_err(|_| ReadError::Damaged { address })
+    }
+
+    pub(super) fn adjacent(self, tree: usize, labels: [u16; 2]) -> Scan<'a> {
         let [from, to] = labels.map(u64::from);
-        self.snapshot
+        self.element
+            .snapshot
             .scan(self.word(tree), [from, 0], [to, u64::MAX])
     }
 
     /// The edges that start here, by label and target.
     pub fn out_edges(&self) -> impl Iterator<Item = Result<EdgeKey, ReadError>> + use<'a> {
-        self.outgoing([0, u16::MAX])
+        self.outgoing([0, u16::MAX]).map(|edge| Ok(edge?.key))
     }
 
     /// The edges of a label that start here, by target.
@@ -172,21 +225,27 @@ impl<'a> Node<'a> {
         &self,
         label: LabelId,
     ) -> impl Iterator<Item = Result<EdgeKey, ReadError>> + use<'a> {
-        self.outgoing([label.0; 2])
+        self.outgoing([label.0; 2]).map(|edge| Ok(edge?.key))
+    }
+
+    /// The edges that start here, ready to be read, by label and target.
+    pub fn edges(&self) -> impl Iterator<Item = Result<Edge<'a>, ReadError>> + use<'a> {
+        self.outgoing([0, u16::MAX])
     }
 
     fn outgoing(
         &self,
         labels: [u16; 2],
-    ) -> impl Iterator<Item = Result<EdgeKey, ReadError>> + use<'a> {
+    ) -> impl Iterator<Item = Result<Edge<'a>, ReadError>> + use<'a> {
         let node = *self;
         node.adjacent(4, labels).map(move |entry| {
-            let ([label, to], _) = entry?;
-            Ok(EdgeKey {
+            let ([label, to], address) = entry?;
+            let key = EdgeKey {
                 from: node.id,
                 label: LabelId(label as u16),
                 to: NodeId(to),
-            })
+            };
+            Ok(Edge::at(node.element.snapshot, address, key))
         })
     }
 
@@ -235,51 +294,18 @@ impl<'a> Node<'a> {
     }
 }
 
-impl Edge<'_> {
+impl<'a> Edge<'a> {
+    pub(super) fn at(snapshot: &'a Snapshot, address: Address, key: EdgeKey) -> Self {
+        let element = Element {
+            snapshot,
+            address,
+            layout: EDGE,
+        };
+        Self { element, key }
+    }
+
     /// What names the edge.
     pub fn key(&self) -> EdgeKey {
         self.key
-    }
-
-    /// The commit that last changed the edge's attributes, or made it.
-    ///
-    /// # Errors
-    /// [`ReadError`].
-    pub fn version(&self) -> Result<Version, ReadError> {
-        let words = self.snapshot.arena.from(self.address);
-        let word = words.and_then(|words| words.get(3));
-        let version = word.map(Word::load).ok_or(self.address);
-        self.snapshot.genuine(version).map(Version)
-    }
-
-    /// One attribute, if the edge has it.
-    ///
-    /// # Errors
-    /// [`ReadError`].
-    pub fn attribute(&self, name: AttributeId) -> Result<Option<Attribute>, ReadError> {
-        let words = self.snapshot.arena.from(self.address);
-        let rows =
-            words.and_then(|words| record::table(words, record::EDGE_HEADER, words.get(2)?.load()));
-        find_attribute(self.snapshot, rows, self.address, name)
-    }
-
-    /// The value of the attribute of that name, if the edge has it.
-    ///
-    /// # Errors
-    /// [`ReadError`].
-    pub fn value(&self, name: &str) -> Result<Option<Value>, ReadError> {
-        let Some(name) = self.snapshot.schema.find_attribute(name) else {
-            return Ok(None);
-        };
-        Ok(self.attribute(name)?.map(|attribute| attribute.value))
-    }
-
-    /// All attributes, by id of their names.
-    ///
-    /// # Errors
-    /// [`ReadError`].
-    pub fn attributes(&self) -> Result<Vec<Attribute>, ReadError> {
-        let record = EdgeRecord::read(&self.snapshot.arena, self.address);
-        all_attributes(self.snapshot, &self.snapshot.genuine(record)?.rows)
     }
 }
