@@ -2,7 +2,7 @@
 
 use crate::cli::Store as Arguments;
 use crate::{Answer, Failure};
-use dsr::{Image, Pace, Store, Turns};
+use dsr::{Image, Instance, Pace, Store, Turns};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -11,10 +11,24 @@ const CLEANING: u32 = 40;
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     let instance = super::instance(&arguments.instance.instance)?;
+    let pace = if arguments.supervised {
+        Pace::Free
+    } else {
+        Pace::Alone
+    };
+    let served = serve(arguments, &instance, pace);
+    if pace == Pace::Alone {
+        instance.remove_if_unused().map_err(Failure::internal)?;
+    }
+    served.map(|()| Answer::Yes)
+}
+
+/// Opens the store and serves until it shall end.
+fn serve(arguments: &Arguments, instance: &Instance, pace: Pace) -> Result<(), Failure> {
     let scenario = super::load_scenario(&arguments.scenario)?;
     let (schema, grammar) = super::load_rules(&scenario)?;
     let interrupted = super::interruption()?;
-    let mut store = Store::open(&instance, schema).map_err(Failure::internal)?;
+    let mut store = Store::open(instance, schema).map_err(Failure::internal)?;
     store.graph_mut().set_rules(Arc::new(grammar));
     match &arguments.restore {
         Some(path) => {
@@ -31,11 +45,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
                 .map_err(Failure::internal)?;
         }
     }
-    let pace = if arguments.supervised {
-        Pace::Free
-    } else {
-        Pace::Alone
-    };
     let mut lifeline = Turns::begin(pace, interrupted).map_err(Failure::internal)?;
     let mut round = 0u32;
     while !lifeline.ended() {
@@ -47,9 +56,5 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
             store.clean_up_after_the_dead();
         }
     }
-    drop(store);
-    if pace == Pace::Alone {
-        instance.remove_if_unused().map_err(Failure::internal)?;
-    }
-    Ok(Answer::Yes)
+    Ok(())
 }

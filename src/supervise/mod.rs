@@ -104,6 +104,14 @@ pub(crate) fn now() -> Instant {
     Instant::now()
 }
 
+#[allow(
+    clippy::disallowed_methods,
+    reason = "other processes' ends cannot be waited for otherwise"
+)]
+fn wait_a_moment() {
+    std::thread::sleep(Duration::from_millis(10));
+}
+
 impl Supervisor {
     /// A supervisor without processes, whose processes' logs go into `logs`.
     pub(crate) fn new(executable: PathBuf, logs: &Path) -> Self {
@@ -403,7 +411,19 @@ impl Hold {
         if std::fs::metadata(&path).map(|m| m.ino()).ok() != Some(locked) {
             return Self::take(instance);
         }
-        instance.remove().into_diagnostic()?;
+        // What a supervisor that was killed had started is about to end.
+        let deadline = now() + PATIENCE / 4;
+        while !instance.remove_if_unused().into_diagnostic()? {
+            if now() > deadline {
+                let processes = instance.processes().into_diagnostic()?;
+                return Err(miette!(
+                    help = "end them, or give this run another --instance",
+                    "instance `{}` is in use by the processes {processes:?}",
+                    instance.name()
+                ));
+            }
+            wait_a_moment();
+        }
         Ok(Self {
             instance: instance.clone(),
             path,

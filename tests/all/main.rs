@@ -10,6 +10,7 @@ mod architecture;
 mod dependencies;
 mod documentation;
 mod examples;
+mod faults;
 mod graph;
 mod path;
 mod plan;

@@ -26,6 +26,7 @@ fn main() -> Outcome {
     let number = |index: usize| rest.get(index).map_or(Ok(0), |text| text.parse::<u64>());
     match role.as_str() {
         "store" => store(&instance),
+        "join" => join(&instance),
         "write-pairs" => write_pairs(&instance),
         "read-pairs" => read_pairs(&instance),
         "memory" => memory(&instance, number(0)?),
@@ -58,6 +59,22 @@ fn store(instance: &Instance) -> Outcome {
     while !ended.load(Ordering::Acquire) {
         store.serve(Duration::from_millis(20))?;
     }
+    Ok(())
+}
+
+/// Joins, waits for the store, opens a channel at both ends.
+fn join(instance: &Instance) -> Outcome {
+    let mut session = Session::join(instance, "guest")?;
+    session.wait_for_store(PATIENCE)?;
+    session.snapshot()?;
+    let sender = session.publisher::<u64>("numbers")?;
+    let receiver = session.subscriber::<u64>("numbers")?;
+    println!("ready");
+    let ended = end_of_input();
+    while !ended.load(Ordering::Acquire) {
+        session.wait_for_tick(Duration::from_millis(20))?;
+    }
+    drop((sender, receiver));
     Ok(())
 }
 

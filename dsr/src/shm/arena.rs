@@ -4,7 +4,9 @@
 //! iceoryx2 does not promise that a sample may be written after it was sent; its version is pinned
 //! and `tests/all/graph.rs` holds the construct.
 
-use super::{InstanceError, Ipc, IpcNode, MAX_PROCESSES, MAX_STORES, ipc, service_name};
+use super::{
+    InstanceError, Ipc, IpcNode, MAX_PROCESSES, MAX_STORES, ipc, one_at_a_time, service_name,
+};
 use crate::Epoch;
 use crate::arena::allocator::{Full, Growth};
 use crate::arena::{Arena, Segment, Word};
@@ -14,6 +16,7 @@ use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy, ZeroCopySend};
 use iceoryx2::sample::Sample;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use rustix::mm::{Advice, madvise};
 use std::sync::Arc;
 
 /// log2 of the words in a segment: 64 MiB.
@@ -36,7 +39,8 @@ pub(crate) struct SegmentHeader {
 type Factory = PortFactory<Ipc, [Word], SegmentHeader>;
 
 fn service(node: &IpcNode) -> Result<Factory, InstanceError> {
-    node.service_builder(&service_name("graph/arena")?)
+    let builder = node
+        .service_builder(&service_name("graph/arena")?)
         .publish_subscribe::<[Word]>()
         .user_header::<SegmentHeader>()
         .max_publishers(MAX_STORES)
@@ -45,9 +49,8 @@ fn service(node: &IpcNode) -> Result<Factory, InstanceError> {
         .history_size(CAPACITY)
         .subscriber_max_buffer_size(CAPACITY)
         .subscriber_max_borrowed_samples(2 * CAPACITY)
-        .enable_safe_overflow(true)
-        .open_or_create()
-        .map_err(|e| ipc("the arena's service", e))
+        .enable_safe_overflow(true);
+    one_at_a_time(node, || builder.open_or_create()).map_err(|e| ipc("the arena's service", e))
 }
 
 /// The store's end: makes segments and sends them to every process.
@@ -78,6 +81,7 @@ impl ArenaPublisher {
         let growth = SharedGrowth {
             publisher: Arc::clone(&self.publisher),
             epoch,
+            starts: Vec::new(),
         };
         (Arc::new(Arena::new(CAPACITY, SHIFT)), Box::new(growth))
     }
@@ -95,7 +99,12 @@ impl ArenaPublisher {
 struct SharedGrowth {
     publisher: Arc<IpcPublisher<Ipc, [Word], SegmentHeader>>,
     epoch: Epoch,
+    /// Where the segments begin.
+    starts: Vec<*const Word>,
 }
+
+// SAFETY: the places are those of the segments below, which any thread may use.
+unsafe impl Send for SharedGrowth {}
 
 impl Growth for SharedGrowth {
     fn grow(&mut self, arena: &Arena, index: usize) -> Result<(), Full> {
@@ -116,6 +125,7 @@ impl Growth for SharedGrowth {
         // this one was not in use before.
         let sample = unsafe { sample.assume_init() };
         sample.send().map_err(|_| Full)?;
+        self.starts.push(start);
         let publisher = Arc::clone(&self.publisher);
         arena.attach(
             index,
@@ -128,17 +138,33 @@ impl Growth for SharedGrowth {
         Ok(())
     }
 
-    fn reserve(&mut self, _: usize, from: usize, to: usize) -> Result<(), Full> {
+    fn reserve(&mut self, index: usize, from: usize, to: usize) -> Result<(), Full> {
         // Pages come into being when they are first touched, and touching one when there is no
-        // room for it kills the process; so ask first, with room to spare for the other writers.
+        // room for it kills the process. So leave room to spare for the messages of the others,
+        // and have the kernel make the pages now, which it may refuse.
         const SPARE: u64 = 8 << 20;
         let needed = ((to - from) * size_of::<Word>()) as u64;
-        let free = rustix::fs::statvfs(super::SHARED_MEMORY).map_or(0, |s| s.f_bavail * s.f_frsize);
-        if free < needed + SPARE {
-            Err(Full)
-        } else {
-            Ok(())
+        if super::free_bytes() < needed + SPARE {
+            return Err(Full);
         }
+        let start = *self.starts.get(index).ok_or(Full)?;
+        populate(start.wrapping_add(from), to - from).map_err(|_| Full)
+    }
+}
+
+/// Makes sure that `len` words at `start` are backed by memory.
+fn populate(start: *const Word, len: usize) -> rustix::io::Result<()> {
+    let page = rustix::param::page_size();
+    let end = start.wrapping_add(len).addr().next_multiple_of(page);
+    let first = start.addr() - start.addr() % page;
+    let place = start.cast_mut().with_addr(first).cast();
+    // SAFETY: the advice changes no content. The range lies, but for the rest of its first and
+    // last page, which belong to the same mapping, in a segment that stays mapped.
+    let made = unsafe { madvise(place, end - first, Advice::LinuxPopulateWrite) };
+    match made {
+        // A kernel before 5.14 cannot; the room was asked for just now.
+        Err(rustix::io::Errno::INVAL) => Ok(()),
+        other => other,
     }
 }
 

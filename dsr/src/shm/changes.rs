@@ -1,7 +1,7 @@
 //! Following the commits of an instance. This file guarantees that a subscriber which missed some is
 //! told so.
 
-use super::{InstanceError, Ipc, Subscriber, ipc};
+use super::{InstanceError, Ipc, Subscriber};
 use crate::{Change, Epoch, Filter, Schema, Version};
 use iceoryx2::port::listener::Listener;
 use std::time::Duration;
@@ -31,10 +31,7 @@ impl Changes {
     /// # Errors
     /// [`InstanceError`].
     pub fn wait(&self, patience: Duration) -> Result<(), InstanceError> {
-        let waited = self.listener.timed_wait(|_| (), patience);
-        waited
-            .map(|_| ())
-            .map_err(|e| ipc("waiting for a commit", e))
+        super::wait(&self.listener, patience, "waiting for a commit")
     }
 
     /// The next commit that passes the filter, or the news that some were missed.

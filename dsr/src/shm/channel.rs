@@ -2,7 +2,7 @@
 //! commands, grids. This file guarantees that a slow or dead receiver holds nobody up: where its
 //! buffer is full the oldest message gives way.
 
-use super::{InstanceError, Ipc, IpcNode, MAX_PROCESSES, ipc, service_name};
+use super::{InstanceError, Ipc, IpcNode, MAX_PROCESSES, ipc, one_at_a_time, service_name};
 use iceoryx2::port::publisher::Publisher as IpcPublisher;
 use iceoryx2::port::subscriber::Subscriber as IpcSubscriber;
 use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
@@ -17,7 +17,8 @@ pub(crate) const BUFFER: usize = 256;
 const UNDER_WAY: usize = 4096;
 
 fn service(node: &IpcNode, name: &str) -> Result<PortFactory<Ipc, [u8], ()>, InstanceError> {
-    node.service_builder(&service_name(name)?)
+    let builder = node
+        .service_builder(&service_name(name)?)
         .publish_subscribe::<[u8]>()
         .max_publishers(8)
         .max_subscribers(MAX_PROCESSES)
@@ -25,8 +26,8 @@ fn service(node: &IpcNode, name: &str) -> Result<PortFactory<Ipc, [u8], ()>, Ins
         .subscriber_max_buffer_size(BUFFER)
         .subscriber_max_borrowed_samples(2)
         .history_size(0)
-        .enable_safe_overflow(true)
-        .open_or_create()
+        .enable_safe_overflow(true);
+    one_at_a_time(node, || builder.open_or_create())
         .map_err(|e| ipc(&format!("channel `{name}`"), e))
 }
 

@@ -8,6 +8,7 @@
 mod arena;
 mod changes;
 mod channel;
+mod gate;
 mod session;
 mod store;
 
@@ -16,16 +17,20 @@ pub use channel::{Publisher, Subscriber};
 pub use session::{AttachError, ClockError, CommitError, Session, Tick};
 pub use store::{Store, StoreError};
 
+use gate::{Gate, one_at_a_time};
 use iceoryx2::config::Config;
+use iceoryx2::node::NodeView;
+use iceoryx2::port::listener::{Listener, ListenerWaitError};
 use iceoryx2::prelude::{
-    CallbackProgression, FileName, LogLevel, NodeBuilder, NodeState, Path as IpcPath,
-    SemanticString, ServiceName, SignalHandlingMode, ipc_threadsafe, set_log_level,
+    CallbackProgression, FileName, LogLevel, NodeState, Path as IpcPath, SemanticString,
+    ServiceName, ipc_threadsafe, set_log_level,
 };
 use std::fs;
 use std::hash::Hasher;
 use std::io;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 use thiserror::Error;
 
 /// iceoryx2's flavour that lets a snapshot be read from any thread.
@@ -37,6 +42,10 @@ pub(crate) type IpcNode = iceoryx2::node::Node<Ipc>;
 pub(crate) const MAX_PROCESSES: usize = 64;
 /// How many lives of the store may leave their ports behind before somebody cleans up.
 pub(crate) const MAX_STORES: usize = 8;
+/// Bytes in the path of a socket, by unix(7), less the end.
+const SOCKET_PATH: usize = 107;
+/// Digits of a port's number.
+const PORT: usize = 34;
 /// Where shared memory shows up as files.
 const SHARED_MEMORY: &str = "/dev/shm";
 
@@ -51,6 +60,25 @@ pub enum InstanceError {
     Unsafe {
         /// The folder.
         path: PathBuf,
+    },
+    /// Another user has made a file of that name first.
+    #[error("{path} belongs to another user; use another instance name, or have it removed")]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The names of sockets have little room.
+    #[error(
+        "the folder {folder} leaves {room} letters for an instance's name, and `{name}` is longer; \
+         set CORTEX_RUNTIME_DIR to a shorter folder"
+    )]
+    LongPath {
+        /// The folder of the user's instances.
+        folder: PathBuf,
+        /// The name.
+        name: String,
+        /// How long it may be.
+        room: usize,
     },
     /// The operating system said no.
     #[error("cannot use {path}: {source}")]
@@ -79,7 +107,7 @@ impl Instance {
     /// the folder for temporary files.
     ///
     /// # Errors
-    /// [`InstanceError::BadName`].
+    /// [`InstanceError::BadName`], [`InstanceError::LongPath`].
     pub fn new(name: &str) -> Result<Self, InstanceError> {
         let good = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         if name.is_empty() || name.len() > 40 || !name.chars().all(good) {
@@ -89,12 +117,27 @@ impl Instance {
             .iter()
             .find_map(|variable| std::env::var_os(variable).filter(|path| !path.is_empty()))
             .map_or_else(std::env::temp_dir, PathBuf::from);
-        let uid = rustix::process::getuid().as_raw();
-        let folder = base.join(format!("cortex-{uid}")).join(name);
-        Ok(Self {
+        Self::within(&base, name)
+    }
+
+    /// The instance of that name whose files are below `base`.
+    fn within(base: &Path, name: &str) -> Result<Self, InstanceError> {
+        let user = base.join(format!("cortex-{}", rustix::process::getuid().as_raw()));
+        let instance = Self {
             name: name.to_owned(),
-            folder,
-        })
+            folder: user.join(name),
+        };
+        // A socket's path is the folder, `/`, the prefix, the port's number and `.event`.
+        let taken = user.as_os_str().len() + 2 + instance.prefix().len() + PORT + ".event".len();
+        let room = SOCKET_PATH.saturating_sub(taken);
+        if name.len() > room {
+            return Err(InstanceError::LongPath {
+                folder: user,
+                name: name.to_owned(),
+                room,
+            });
+        }
+        Ok(instance)
     }
 
     /// Its name.
@@ -109,11 +152,16 @@ impl Instance {
 
     /// What the names of its shared-memory files start with.
     fn prefix(&self) -> String {
-        // A hash, for names of sockets have little room; and an end that no other prefix has.
+        // A hash, for names of sockets have little room; of the whole path, which holds the user;
+        // and an end that no other prefix has.
         let mut hasher = rustc_hash::FxHasher::default();
-        hasher.write(self.name.as_bytes());
+        hasher.write(self.folder.as_os_str().as_encoded_bytes());
         let hash = hasher.finish();
-        format!("cortex_{}_{hash:016x}.", rustix::process::getuid().as_raw())
+        // Of the 64 bits the upper 60, five a letter: they are the better mixed.
+        let letter =
+            |i: u32| b"0123456789abcdefghijklmnopqrstuv"[(hash >> (4 + 5 * i)) as usize % 32];
+        let letters: String = (0..12).map(|i| char::from(letter(i))).collect();
+        format!("cortex_{letters}.")
     }
 
     /// Whether anything of it is there.
@@ -139,7 +187,7 @@ impl Instance {
                 .map_err(io(folder))?;
             let metadata = fs::symlink_metadata(folder).map_err(io(folder))?;
             let mine = metadata.uid() == rustix::process::getuid().as_raw();
-            if !metadata.is_dir() || !mine || metadata.permissions().mode() & 0o022 != 0 {
+            if !metadata.is_dir() || !mine || metadata.permissions().mode() & 0o077 != 0 {
                 return Err(InstanceError::Unsafe {
                     path: folder.to_owned(),
                 });
@@ -171,19 +219,42 @@ impl Instance {
         }
     }
 
-    /// Removes the instance if none of its processes runs: for a process that was started by hand
-    /// and ends, and may be the last.
+    /// Removes the instance if none of its processes runs, and tells whether it did: for a process
+    /// that was started by hand and ends, and may be the last. A process that is just starting
+    /// either is seen here or finds nothing and begins anew.
     ///
     /// # Errors
     /// [`InstanceError`].
-    pub fn remove_if_unused(&self) -> Result<(), InstanceError> {
-        let mut running = 0;
+    pub fn remove_if_unused(&self) -> Result<bool, InstanceError> {
+        let Some(gate) = Gate::enter(self)? else {
+            return Ok(false);
+        };
+        let unused = self.processes()?.is_empty();
+        if unused {
+            self.remove()?;
+        }
+        drop(gate);
+        Ok(unused)
+    }
+
+    /// The ids of the processes that have joined it and are alive.
+    ///
+    /// # Errors
+    /// [`InstanceError`].
+    pub fn processes(&self) -> Result<Vec<u32>, InstanceError> {
+        let mut alive = Vec::new();
         IpcNode::list(&self.config()?, |state| {
-            running += u32::from(matches!(state, NodeState::Alive(_)));
+            if let NodeState::Alive(node) = state
+                && let Ok(process) = node.id().pid::<Ipc>()
+            {
+                alive.push(process.value().cast_unsigned());
+            }
             CallbackProgression::Continue
         })
         .map_err(|e| ipc("listing the instance's processes", e))?;
-        if running == 0 { self.remove() } else { Ok(()) }
+        alive.sort_unstable();
+        alive.dedup();
+        Ok(alive)
     }
 
     /// The instance's files in shared memory.
@@ -229,11 +300,11 @@ impl Instance {
     /// Announces this process as a member of the instance.
     pub(crate) fn join(&self) -> Result<IpcNode, InstanceError> {
         set_log_level(LogLevel::Fatal);
-        NodeBuilder::new()
-            .config(&self.config()?)
-            .signal_handling_mode(SignalHandlingMode::Disabled)
-            .create::<Ipc>()
-            .map_err(|e| InstanceError::Ipc(format!("cannot join the instance: {e}")))
+        let gate = Gate::enter(self)?;
+        if gate.is_none() {
+            tracing::warn!("another process has been joining for seconds; is it stopped?");
+        }
+        gate::join(self, &self.config()?)
     }
 }
 
@@ -242,6 +313,60 @@ pub(crate) fn service_name(name: &str) -> Result<ServiceName, InstanceError> {
     ServiceName::new(name).map_err(|e| InstanceError::Ipc(format!("service `{name}`: {e}")))
 }
 
+/// Waits up to `patience` until it is rung. A signal to this process ends the wait too: whoever
+/// waits looks again, and may find that it shall end.
+pub(crate) fn wait(
+    listener: &Listener<Ipc>,
+    patience: Duration,
+    what: &str,
+) -> Result<(), InstanceError> {
+    // To a socket no time at all would mean for ever.
+    let patience = patience.max(Duration::from_micros(1));
+    match listener.timed_wait(|_| (), patience) {
+        Ok(_) | Err(ListenerWaitError::InterruptSignal) => Ok(()),
+        Err(error) => Err(ipc(what, error)),
+    }
+}
+
+/// How much shared memory the host has left, in bytes.
+pub(crate) fn free_bytes() -> u64 {
+    rustix::fs::statvfs(SHARED_MEMORY).map_or(0, |s| s.f_bavail * s.f_frsize)
+}
+
 fn ipc(what: &str, error: impl std::fmt::Display) -> InstanceError {
     InstanceError::Ipc(format!("{what}: {error}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_that_leaves_no_room_for_sockets_is_refused_with_the_room_there_is() {
+        let base = Path::new("/run/user/1000");
+        let longest = Instance::within(base, &"x".repeat(19)).unwrap();
+        let socket =
+            longest
+                .folder()
+                .join(format!("{}{}.event", longest.prefix(), "9".repeat(PORT)));
+        assert!(socket.as_os_str().len() <= SOCKET_PATH, "{socket:?}");
+        let deep = base.join("a-folder-that-lies-deep").join("below/others");
+        let error = Instance::within(&deep, "default-baseline").unwrap_err();
+        let InstanceError::LongPath { room, .. } = error else {
+            panic!("{error}");
+        };
+        assert!(Instance::within(&deep, &"x".repeat(room)).is_ok());
+        assert!(Instance::within(&deep, &"x".repeat(room + 1)).is_err());
+    }
+
+    #[test]
+    fn instances_of_one_name_in_two_folders_have_different_prefixes() {
+        let of = |base| {
+            Instance::within(Path::new(base), "default")
+                .unwrap()
+                .prefix()
+        };
+        assert_ne!(of("/run"), of("/run/x"));
+        assert_eq!(of("/run"), of("/run"));
+    }
 }

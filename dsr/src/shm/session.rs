@@ -6,7 +6,8 @@
 use super::arena::ArenaSubscriber;
 use super::changes::Changes;
 use super::{
-    Instance, InstanceError, Ipc, IpcNode, MAX_PROCESSES, Publisher, Subscriber, ipc, service_name,
+    Instance, InstanceError, Ipc, IpcNode, MAX_PROCESSES, Publisher, Subscriber, ipc,
+    one_at_a_time, service_name, wait,
 };
 use crate::arena::Arena;
 use crate::arena::record;
@@ -50,27 +51,27 @@ pub(super) struct Request {
 type RequestFactory = request_response::PortFactory<Ipc, [u8], (), [u8], ()>;
 
 pub(super) fn requests(node: &IpcNode) -> Result<RequestFactory, InstanceError> {
-    node.service_builder(&service_name(REQUESTS)?)
+    let builder = node
+        .service_builder(&service_name(REQUESTS)?)
         .request_response::<[u8], [u8]>()
         .max_servers(2)
         .max_clients(MAX_PROCESSES)
         .max_nodes(MAX_PROCESSES)
-        .max_active_requests_per_client(4)
-        .open_or_create()
-        .map_err(|e| ipc("the store's requests", e))
+        .max_active_requests_per_client(4);
+    one_at_a_time(node, || builder.open_or_create()).map_err(|e| ipc("the store's requests", e))
 }
 
 pub(super) fn event(
     node: &IpcNode,
     name: &str,
 ) -> Result<event_factory::PortFactory<Ipc>, InstanceError> {
-    node.service_builder(&service_name(name)?)
+    let builder = node
+        .service_builder(&service_name(name)?)
         .event()
         .max_listeners(MAX_PROCESSES)
         .max_notifiers(MAX_PROCESSES)
-        .max_nodes(MAX_PROCESSES)
-        .open_or_create()
-        .map_err(|e| ipc(&format!("event `{name}`"), e))
+        .max_nodes(MAX_PROCESSES);
+    one_at_a_time(node, || builder.open_or_create()).map_err(|e| ipc(&format!("event `{name}`"), e))
 }
 
 /// Why a process cannot see the graph.
@@ -225,9 +226,7 @@ impl Session {
             }
             self.ring();
             let nap = left.min(Duration::from_millis(5));
-            self.answers
-                .timed_wait(|_| (), nap)
-                .map_err(|e| ipc("waiting for the store", e))?;
+            wait(&self.answers, nap, "waiting for the store")?;
         }
         Ok(())
     }
@@ -348,9 +347,7 @@ impl Session {
                 if left.is_zero() {
                     break;
                 }
-                self.answers
-                    .timed_wait(|_| (), left)
-                    .map_err(|e| ipc("waiting for an answer", e))?;
+                wait(&self.answers, left, "waiting for an answer")?;
             }
             if self.epoch()? != epoch {
                 return Err(CommitError::StoreRestarted);
@@ -461,9 +458,7 @@ impl Session {
         if let Some(tick) = ticks.newest()? {
             return Ok(Some(tick));
         }
-        listener
-            .timed_wait(|_| (), patience)
-            .map_err(|e| ipc("waiting for a tick", e))?;
+        wait(listener, patience, "waiting for a tick")?;
         Ok(ticks.newest()?)
     }
 }

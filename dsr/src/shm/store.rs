@@ -3,7 +3,7 @@
 
 use super::arena::ArenaPublisher;
 use super::session::{CHANGES, COMMITS_EVENT, REQUESTS_EVENT, Request, event, requests};
-use super::{Instance, InstanceError, Ipc, IpcNode, Publisher, ipc};
+use super::{Instance, InstanceError, Ipc, IpcNode, Publisher, ipc, wait};
 use crate::arena::allocator::Full;
 use crate::graph::Image;
 use crate::{Change, Commit, Epoch, Graph, Refusal, Schema, Time, Transaction};
@@ -134,9 +134,7 @@ impl Store {
     /// [`StoreError::Instance`] where the instance's shared memory is gone.
     pub fn serve(&mut self, patience: Duration) -> Result<usize, StoreError> {
         self.graph.announce();
-        self.wake
-            .timed_wait(|_| (), patience)
-            .map_err(|e| ipc("waiting for requests", e))?;
+        wait(&self.wake, patience, "waiting for requests")?;
         self.arena.serve_newcomers();
         let mut served = 0;
         while let Some(active) = self

@@ -9,6 +9,22 @@ use dsr::Instance;
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::mpsc::channel;
+use std::time::Duration;
+
+/// Asks again and again until there is an answer, or the time is over.
+pub(crate) fn within<T>(patience: Duration, mut ask: impl FnMut() -> Option<T>) -> Option<T> {
+    const PAUSE: Duration = Duration::from_millis(5);
+    // Nobody sends anything: to receive is to pause.
+    let (_silent, pause) = channel::<()>();
+    let rounds = patience.as_millis() / PAUSE.as_millis();
+    (0..=rounds).find_map(|round| {
+        if round > 0 {
+            assert!(pause.recv_timeout(PAUSE).is_err());
+        }
+        ask()
+    })
+}
 
 /// An instance of a test's own; whatever is left of it is removed at the end.
 pub(crate) struct TestInstance(pub(crate) Instance);

@@ -1,0 +1,143 @@
+//! The gate of an instance: one process at a time joins it, opens a service in it, or removes it.
+//! This file guarantees that nothing is removed under a process that is just starting, and that
+//! no file of the instance can be opened by another user.
+//!
+//! iceoryx2 lets several processes make the same service at once, and most of the time it works;
+//! a lock makes it all of the time. The lock is one on the instance's folder, which leaves no file
+//! behind and is given back by the kernel when its holder dies.
+
+use super::{Instance, InstanceError, Ipc, IpcNode, ipc};
+use iceoryx2::config::Config;
+use iceoryx2::prelude::{NodeBuilder, SignalHandlingMode};
+use rustix::fs::{FlockOperation, flock};
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// How long a process waits for another to get through.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// How often it looks.
+const LOOK: Duration = Duration::from_millis(1);
+/// What iceoryx2 calls the file that it makes for everybody on the host to write to.
+const OPEN_FILE: &str = ".global_mgmt";
+
+/// While it lives, no other process gets through the gate.
+#[derive(Debug)]
+pub(crate) struct Gate {
+    _lock: File,
+}
+
+#[allow(
+    clippy::disallowed_methods,
+    reason = "a lock cannot be waited for with a time limit otherwise"
+)]
+fn lock(folder: &Path) -> io::Result<Option<Gate>> {
+    let file = File::open(folder)?;
+    let deadline = Instant::now() + PATIENCE;
+    while flock(&file, FlockOperation::NonBlockingLockExclusive).is_err() {
+        if Instant::now() > deadline {
+            return Ok(None);
+        }
+        std::thread::sleep(LOOK);
+    }
+    // Whoever held it may have removed the folder.
+    let same = fs::metadata(folder).is_ok_and(|now| {
+        file.metadata()
+            .is_ok_and(|then| (then.dev(), then.ino()) == (now.dev(), now.ino()))
+    });
+    if same {
+        Ok(Some(Gate { _lock: file }))
+    } else {
+        Err(io::ErrorKind::NotFound.into())
+    }
+}
+
+impl Gate {
+    /// Makes the instance's folder and goes through its gate. `None` where another process has
+    /// been in it for seconds, so that it must be stopped: whoever only wants to join goes on
+    /// without.
+    pub(super) fn enter(instance: &Instance) -> Result<Option<Self>, InstanceError> {
+        loop {
+            instance.create_folder()?;
+            match lock(instance.folder()) {
+                Ok(gate) => return Ok(gate),
+                // Removed between the two.
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+                Err(source) => {
+                    let path = instance.folder().to_owned();
+                    return Err(InstanceError::Io { path, source });
+                }
+            }
+        }
+    }
+}
+
+/// Opens something that several processes may open at once, one process after the other.
+pub(super) fn one_at_a_time<T>(node: &IpcNode, open: impl FnOnce() -> T) -> T {
+    let folder = node.config().global.root_path().to_string();
+    // Without the gate it works too, but for bad luck.
+    let gate = lock(Path::new(&folder)).ok().flatten();
+    if gate.is_none() {
+        tracing::warn!("another process has held {folder} for {PATIENCE:?}; is it stopped?");
+    }
+    open()
+}
+
+fn node(config: &Config) -> Result<IpcNode, InstanceError> {
+    NodeBuilder::new()
+        .config(config)
+        .signal_handling_mode(SignalHandlingMode::Disabled)
+        .create::<Ipc>()
+        .map_err(|e| ipc("cannot join the instance", e))
+}
+
+/// Announces this process as a member of the instance. To be called inside the gate.
+pub(super) fn join(instance: &Instance, config: &Config) -> Result<IpcNode, InstanceError> {
+    if !seal(instance)? {
+        // The first node of an instance makes the file; this one is for that alone.
+        drop(node(config)?);
+        seal(instance)?;
+    }
+    node(config)
+}
+
+/// Closes the one file that iceoryx2 opens to all users, and which whoever truncates it could end
+/// every process with that joins. iceoryx2 looks at it only while a process joins, so that inside
+/// the gate nobody does: a copy that only its owner can open takes its place, and whoever opened
+/// the first holds a file that nobody reads any more. Whether there is one.
+fn seal(instance: &Instance) -> Result<bool, InstanceError> {
+    let mut sealed = false;
+    for path in instance.shared_memory()? {
+        let io = |source| InstanceError::Io {
+            path: path.clone(),
+            source,
+        };
+        if !path.to_string_lossy().ends_with(OPEN_FILE) {
+            continue;
+        }
+        let metadata = fs::symlink_metadata(&path).map_err(io)?;
+        if metadata.uid() != rustix::process::getuid().as_raw() || !metadata.is_file() {
+            return Err(InstanceError::Foreign { path });
+        }
+        if metadata.mode().trailing_zeros() >= 6 {
+            sealed = true;
+            continue;
+        }
+        let content = fs::read(&path).map_err(io)?;
+        let sealing = path.with_extension("sealing");
+        // Left by a process that was killed at this very place.
+        drop(fs::remove_file(&sealing));
+        let mut copy = File::options()
+            .write(true)
+            .create_new(true)
+            .mode(0o600)
+            .open(&sealing)
+            .map_err(io)?;
+        copy.write_all(&content).map_err(io)?;
+        fs::rename(&sealing, &path).map_err(io)?;
+        sealed = true;
+    }
+    Ok(sealed)
+}
