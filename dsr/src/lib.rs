@@ -38,7 +38,8 @@ pub use shm::{
     Store, StoreError, Subscriber, Tick, Update,
 };
 pub use snapshot::{
-    Attribute, Edge, Edges, Element, Neighbors, Node, NodeIds, Snapshot, TripleCount, ValueRange,
+    Attribute, Edge, Edges, Element, Neighbors, Node, NodeIds, Snapshot, TransformError,
+    TripleCount, ValueRange,
 };
 pub use time::Time;
 pub use transaction::{

@@ -3,9 +3,12 @@
 //! read says [`ReadError::SnapshotTooOld`] and never gives foreign or half-written data.
 
 mod element;
+mod geometry;
+mod past;
 mod petgraph;
 
 pub use element::{Attribute, Edge, Element, Node};
+pub use geometry::TransformError;
 pub use petgraph::{Edges, Neighbors};
 
 use crate::arena::record;
@@ -13,10 +16,8 @@ use crate::arena::tree::{self, Key};
 use crate::arena::{Address, Arena, ReadError, Root, trie};
 use crate::value::{hash, place};
 use crate::{
-    AttributeId, EdgeKey, LabelId, NodeId, Pose, Schema, Time, TypeId, Value, Version, WriterId,
-    pose_on_floor,
+    AttributeId, EdgeKey, LabelId, NodeId, Schema, Time, TypeId, Value, Version, WriterId,
 };
-use nalgebra::Isometry2;
 use std::sync::{Arc, OnceLock};
 
 /// The graph as of one commit.
@@ -375,48 +376,6 @@ impl Snapshot {
         postcard::from_bytes(&bytes).map_err(|_| ReadError::Damaged {
             address: self.root.writers,
         })
-    }
-
-    /// Where `node` is on the floor of the world: the product of the `pose` edges' `transform`s
-    /// from the root of its kinematic tree down to it. `None` where no `pose` edge leads to it.
-    ///
-    /// # Errors
-    /// [`ReadError`].
-    pub fn world_from(&self, node: NodeId) -> Result<Option<Isometry2<f64>>, ReadError> {
-        Ok(self.pose_in_world(node)?.as_ref().map(pose_on_floor))
-    }
-
-    /// Where `node` is in the world, in space; see [`Self::world_from`].
-    ///
-    /// # Errors
-    /// [`ReadError`].
-    pub fn pose_in_world(&self, node: NodeId) -> Result<Option<Pose>, ReadError> {
-        let (Some(label), Some(transform)) = (
-            self.schema.find_label("pose"),
-            self.schema.find_attribute("transform"),
-        ) else {
-            return Ok(None);
-        };
-        let mut world_from_node: Option<Pose> = None;
-        let mut child = node;
-        // A kinematic tree has no circle; this bounds the walk where somebody made one.
-        for _ in 0..64 {
-            let Some(found) = self.find_node(child)? else {
-                break;
-            };
-            let Some(key) = found.in_edges_of(label).next().transpose()? else {
-                break;
-            };
-            let Some(edge) = self.find_edge(key)? else {
-                break;
-            };
-            let Some(Value::Pose(step)) = edge.attribute(transform)?.map(|a| a.value) else {
-                break;
-            };
-            world_from_node = Some(world_from_node.map_or(step, |below| step * below));
-            child = key.from;
-        }
-        Ok(world_from_node)
     }
 }
 

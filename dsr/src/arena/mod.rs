@@ -73,7 +73,7 @@ impl Segment for Box<[Word]> {
 }
 
 pub(crate) const MAGIC: u64 = u64::from_le_bytes(*b"cortexG1");
-pub(crate) const FORMAT: u64 = 2;
+pub(crate) const FORMAT: u64 = 3;
 
 /// Header words of segment 0.
 mod at {
@@ -87,7 +87,7 @@ mod at {
 }
 
 /// How many versions back a root can be looked up.
-const ROOT_RING: u64 = 256;
+const ROOT_RING: u64 = 4096;
 /// Words of a root.
 pub(crate) const ROOT_WORDS: usize = 16;
 /// First word that blocks are given out from.
@@ -118,6 +118,10 @@ pub(crate) struct Root {
     pub(crate) triples: Address,
     /// Directory by attribute with an index: tree of (value's place in the order, node id), count.
     pub(crate) values: Address,
+    /// The agent that made the version: 1 more than its number among the writers, 0 for none.
+    pub(crate) agent: u64,
+    /// Blob: the rules that were applied; 0 for none.
+    pub(crate) rules: Address,
 }
 
 impl Root {
@@ -131,20 +135,17 @@ impl Root {
             labels,
             schema,
             schema_version,
-            ..
-        } = self;
-        let Self {
             writers,
             node_count,
             edge_count,
             next_id,
             triples,
             values,
-            ..
+            agent,
+            rules,
         } = self;
         let time = time.cast_unsigned();
-        let mut words = [0; ROOT_WORDS];
-        words[..14].copy_from_slice(&[
+        [
             version,
             time,
             nodes,
@@ -159,12 +160,13 @@ impl Root {
             next_id,
             triples,
             values,
-        ]);
-        words
+            agent,
+            rules,
+        ]
     }
 
-    fn from_words(words: &[u64; ROOT_WORDS]) -> Self {
-        let &[
+    fn from_words(words: [u64; ROOT_WORDS]) -> Self {
+        let [
             version,
             time,
             nodes,
@@ -174,10 +176,14 @@ impl Root {
             schema,
             schema_version,
             writers,
-            ..,
+            node_count,
+            edge_count,
+            next_id,
+            triples,
+            values,
+            agent,
+            rules,
         ] = words;
-        let [node_count, edge_count, next_id] = [words[9], words[10], words[11]];
-        let [triples, values] = [words[12], words[13]];
         let time = time.cast_signed();
         Self {
             version,
@@ -194,6 +200,8 @@ impl Root {
             next_id,
             triples,
             values,
+            agent,
+            rules,
         }
     }
 
@@ -324,7 +332,7 @@ impl Arena {
             fence(Ordering::Acquire);
             // The slot is written over no sooner than when `head` is within one of a ring's turn.
             if self.head().wrapping_sub(version) < ROOT_RING - 1 {
-                let root = Root::from_words(&words);
+                let root = Root::from_words(words);
                 if root.version != version {
                     return Err(ReadError::Damaged {
                         address: at::ROOTS as u64,
@@ -333,6 +341,43 @@ impl Arena {
                 return Ok(root);
             }
         }
+    }
+
+    /// Reads the root of a version, as far back as it is kept.
+    pub(crate) fn root_of(&self, version: u64) -> Result<Root, ReadError> {
+        let slot = self
+            .root_at(version)
+            .ok_or(ReadError::Damaged { address: 0 })?;
+        let mut words = [0; ROOT_WORDS];
+        for (to, from) in words.iter_mut().zip(slot) {
+            *to = from.load();
+        }
+        fence(Ordering::Acquire);
+        let head = self.head();
+        let root = Root::from_words(words);
+        // As for the newest: the slot is written over when `head` is within one of a ring's turn.
+        if root.version != version || head.wrapping_sub(version) >= ROOT_RING - 1 {
+            let oldest = self.oldest_root(head);
+            return Err(ReadError::SnapshotTooOld {
+                version: Version(version),
+                oldest: Version(oldest),
+            });
+        }
+        self.check(version).map(|()| root)
+    }
+
+    /// The oldest version up to `newest` whose root is kept.
+    pub(crate) fn oldest_root(&self, newest: u64) -> u64 {
+        let turned = self.head().saturating_sub(ROOT_RING - 2);
+        let first = self.oldest().max(turned).max(1);
+        let kept = |version: u64| {
+            let slot = self.root_at(version).and_then(<[_]>::first);
+            slot.map(Word::load) == Some(version)
+        };
+        // The versions before a restored one were made in another arena.
+        (first..newest)
+            .find(|&version| kept(version))
+            .unwrap_or(newest)
     }
 
     /// Makes `root` the newest version: one release store, before which nobody sees any of it.

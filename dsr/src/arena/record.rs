@@ -5,7 +5,9 @@
 //!   attributes as `attribute << 48 | address`, ascending. Out tree: (label, target) to edge;
 //!   in tree: (label, source) to 0.
 //! - Edge: from, to, `label | count << 32`, version, then attributes as in a node.
-//! - Attribute: `kind | writer << 16 | length << 32`, version, time, then the value.
+//! - Attribute: `kind | writer << 16 | length << 32`, version, time, then the value. With a history,
+//!   bit 15 of the kind is set and a word `count << 48 | address` comes before the value: how many
+//!   older values there are, and the record of the newest of them.
 //! - Blob: length in bytes, then the bytes, eight to a word, lowest first.
 //! - Directory: length, then (tree, count) per id.
 
@@ -20,6 +22,8 @@ pub(crate) const NODE_HEADER: usize = 6;
 pub(crate) const EDGE_HEADER: usize = 4;
 const ATTRIBUTE_HEADER: usize = 3;
 const ADDRESS_MASK: u64 = (1 << 48) - 1;
+/// In an attribute's kind: the record leads to older ones.
+const HAS_HISTORY: u16 = 1 << 15;
 
 /// The key under which edges of a label between nodes of these exact types are counted.
 pub(crate) fn triple(label: u16, from: u16, to: u16) -> Key {
@@ -120,6 +124,9 @@ pub(crate) struct AttributeRecord {
     pub(crate) version: u64,
     pub(crate) time: i64,
     pub(crate) writer: u16,
+    /// How many older records there are, and the address of the newest of them; `None` where the
+    /// attribute keeps no history.
+    pub(crate) older: Option<(u16, Address)>,
 }
 
 impl AttributeRecord {
@@ -127,20 +134,30 @@ impl AttributeRecord {
         let words = arena.from(address).ok_or(address)?;
         let at = |i: usize| words.get(i).map(Word::load).ok_or(address);
         let head = at(0)?;
-        let value = words.get(ATTRIBUTE_HEADER..).ok_or(address)?;
+        let kind = head as u16;
+        let (older, header) = if kind & HAS_HISTORY == 0 {
+            (None, ATTRIBUTE_HEADER)
+        } else {
+            (Some(split_row(at(ATTRIBUTE_HEADER)?)), ATTRIBUTE_HEADER + 1)
+        };
+        let value = words.get(header..).ok_or(address)?;
+        let length = (head >> 32) as usize;
         Ok(Self {
-            value: decode(head as u16, (head >> 32) as usize, value).ok_or(address)?,
+            value: decode(kind & !HAS_HISTORY, length, value).ok_or(address)?,
             version: at(1)?,
             time: at(2)?.cast_signed(),
             writer: (head >> 16) as u16,
+            older,
         })
     }
 
     pub(crate) fn words(&self) -> Vec<u64> {
         let (length, value) = encode(&self.value);
-        let kind = self.value.kind() as u64;
+        let flag = self.older.map_or(0, |_| u64::from(HAS_HISTORY));
+        let kind = self.value.kind() as u64 | flag;
         let head = kind | u64::from(self.writer) << 16 | (length as u64) << 32;
         let mut words = vec![head, self.version, self.time.cast_unsigned()];
+        words.extend(self.older.map(|(count, address)| row(count, address)));
         words.extend(value);
         words
     }
@@ -152,8 +169,25 @@ impl AttributeRecord {
             .and_then(<[_]>::first)
             .map_or(ATTRIBUTE_HEADER, |head| {
                 let head = head.load();
-                ATTRIBUTE_HEADER + value_words(head as u16, (head >> 32) as usize).unwrap_or(0)
+                let kind = head as u16;
+                let link = usize::from(kind & HAS_HISTORY != 0);
+                let value = value_words(kind & !HAS_HISTORY, (head >> 32) as usize);
+                ATTRIBUTE_HEADER + link + value.unwrap_or(0)
             })
+    }
+
+    /// Where the record at `address` leads: how many older records there are, and the newest of
+    /// them.
+    pub(crate) fn older(arena: &Arena, address: Address) -> Option<(u16, Address)> {
+        let words = arena.from(address)?;
+        let kind = words.first()?.load() as u16;
+        let link = || Some(split_row(words.get(ATTRIBUTE_HEADER)?.load()));
+        (kind & HAS_HISTORY != 0).then(link)?
+    }
+
+    /// The version that wrote the record at `address`.
+    pub(crate) fn version(arena: &Arena, address: Address) -> Option<u64> {
+        Some(arena.from(address)?.get(1)?.load())
     }
 }
 

@@ -9,7 +9,7 @@ mod nodes;
 use super::Graph;
 use super::image::{AttributeImage, Image};
 use crate::arena::allocator::Full;
-use crate::arena::record::{AttributeRecord, split_row};
+use crate::arena::record::{self, AttributeRecord, split_row};
 use crate::arena::{Address, Root};
 use crate::{
     AttributeId, AttributeType, Change, EdgeChange, EdgeKey, EdgeRef, LabelId, NodeChange, NodeId,
@@ -90,6 +90,13 @@ impl<'a> Work<'a> {
         let writer = graph
             .writer_id(agent, &mut root)
             .map_err(|Full| graph.full())?;
+        root.agent = u64::from(writer) + 1;
+        let rules = std::mem::take(&mut root.rules);
+        if rules != 0 {
+            // They are those of the version before.
+            let words = record::blob_len(&graph.writer.arena, rules);
+            graph.writer.retire(rules, words);
+        }
         Ok(Self {
             graph,
             root,
@@ -136,6 +143,8 @@ impl<'a> Work<'a> {
         work.room(writers)?;
         work.root.version = version.0;
         work.root.time = time.nanoseconds();
+        // The image does not say who made its version.
+        work.root.agent = 0;
         work.root.next_id = next_id.max(work.root.next_id);
         Ok(work.root)
     }
@@ -322,6 +331,7 @@ impl<'a> Work<'a> {
                     min: None,
                     max: None,
                     index: false,
+                    history: 0,
                 };
                 Ok(schema.add_attribute(attribute)?)
             }
@@ -333,6 +343,12 @@ impl<'a> Work<'a> {
         if self.schema_changed {
             let written = self.graph.write_schema(&mut self.root);
             self.room(written)?;
+        }
+        if !self.rules.is_empty() {
+            // Encoding to memory cannot fail for these types; readers refuse an empty blob.
+            let bytes = postcard::to_stdvec(&self.rules).unwrap_or_default();
+            let written = record::write_blob(&mut self.graph.writer, &bytes);
+            self.root.rules = self.room(written)?;
         }
         let change = Change {
             epoch: self.graph.epoch,

@@ -10,7 +10,7 @@ use crate::{
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// An attribute with its history's last entry.
+/// A value of an attribute; older values of its history come before it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct AttributeImage {
     pub(super) name: AttributeId,
@@ -65,7 +65,7 @@ impl Image {
         let mut edges = Vec::new();
         for node in snapshot.nodes() {
             let node = node?;
-            let attributes = node.attributes()?.into_iter().map(image).collect();
+            let attributes = node.recorded()?.into_iter().map(image).collect();
             let (id, type_id) = (node.id(), node.type_id());
             nodes.push(NodeImage {
                 id,
@@ -79,7 +79,7 @@ impl Image {
                 let Some(edge) = snapshot.find_edge(key)? else {
                     continue;
                 };
-                let attributes = edge.attributes()?.into_iter().map(image).collect();
+                let attributes = edge.recorded()?.into_iter().map(image).collect();
                 let version = edge.version()?.0;
                 edges.push(EdgeImage {
                     key,

@@ -9,6 +9,9 @@ use std::collections::BTreeMap;
 use thiserror::Error;
 use toml::Spanned;
 
+/// How many values of an attribute can be kept.
+const HISTORY: std::ops::RangeInclusive<u64> = 2..=4096;
+
 /// What is wrong with a schema file, and where.
 #[derive(Debug, Clone, Error, Diagnostic)]
 #[error("{message}")]
@@ -53,17 +56,18 @@ struct AttributeRow {
     min: Option<f64>,
     max: Option<f64>,
     index: Option<Spanned<bool>>,
+    history: Option<Spanned<u64>>,
 }
 
 impl Schema {
     /// Reads a schema file: `types` maps each type to its parents, `labels` each label to the
     /// types it may start `from` and end at (`to`), `attributes` each attribute to its `kind`
-    /// (see [`ValueKind::name`]), `unit`, `min`, `max` and `index`. `open = true` lets other names
-    /// in.
+    /// (see [`ValueKind::name`]), `unit`, `min`, `max`, `index` and `history`. `open = true` lets
+    /// other names in.
     ///
     /// # Errors
     /// Broken TOML, an unknown key, kind or type name, an index of what has no order and is no
-    /// text; with its place in the file.
+    /// text, a history that is too short or too long; with its place in the file.
     pub fn from_toml(file_name: &str, text: &str) -> Result<Self, SchemaFileError> {
         let error = |message: String, span: Option<std::ops::Range<usize>>, help| SchemaFileError {
             message,
@@ -137,6 +141,17 @@ impl Schema {
                 let help = "numbers, bools and strings can".to_owned();
                 return Err(error(message, Some(asked.span()), Some(help)));
             }
+            let history = row.history.as_ref().map_or(0, |history| *history.get_ref());
+            if let Some(asked) = row.history
+                && !HISTORY.contains(&history)
+            {
+                let message = format!(
+                    "a history has {} to {} values",
+                    HISTORY.start(),
+                    HISTORY.end()
+                );
+                return Err(error(message, Some(asked.span()), None));
+            }
             let attribute = AttributeType {
                 name: name.get_ref().clone(),
                 kind: Some(kind),
@@ -144,6 +159,7 @@ impl Schema {
                 min: row.min,
                 max: row.max,
                 index,
+                history: history as u16,
             };
             schema
                 .add_attribute(attribute)
@@ -183,6 +199,15 @@ mod tests {
         assert_eq!(
             (message.as_str(), place.as_str()),
             ("a pose cannot have an index", "true")
+        );
+    }
+
+    #[test]
+    fn a_history_of_one_value_is_pointed_at() {
+        let (message, place) = place_of("[attributes]\nx = { kind = \"pose\", history = 1 }\n");
+        assert_eq!(
+            (message.as_str(), place.as_str()),
+            ("a history has 2 to 4096 values", "1")
         );
     }
 

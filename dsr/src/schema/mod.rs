@@ -47,6 +47,8 @@ pub struct AttributeType {
     pub max: Option<f64>,
     /// Whether the graph keeps an index of the nodes by its value.
     pub index: bool,
+    /// How many of its values are kept, the newest among them; 0 for no history.
+    pub history: u16,
 }
 
 /// The names a graph may use.
@@ -153,6 +155,12 @@ impl Schema {
     pub fn has_index(&self, attribute: AttributeId) -> bool {
         let known = self.parts.attributes.get(usize::from(attribute.0));
         known.is_some_and(|attribute| attribute.index)
+    }
+
+    /// How many values of the attribute are kept, the newest among them; 0 for no history.
+    pub fn history(&self, attribute: AttributeId) -> usize {
+        let known = self.parts.attributes.get(usize::from(attribute.0));
+        known.map_or(0, |attribute| usize::from(attribute.history))
     }
 
     /// A type's name.

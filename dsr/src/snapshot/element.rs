@@ -135,6 +135,52 @@ impl<'a> Element<'a> {
         })
     }
 
+    /// The values of an attribute that are kept, newest first: as many as the schema's `history`
+    /// asks for, else the one that it has.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn history(&self, name: AttributeId) -> Result<Vec<Attribute>, ReadError> {
+        let mut history = Vec::new();
+        if let Some(address) = self.find_row(name)? {
+            self.append_history(name, address, &mut history)?;
+        }
+        Ok(history)
+    }
+
+    fn append_history(
+        &self,
+        name: AttributeId,
+        address: Address,
+        history: &mut Vec<Attribute>,
+    ) -> Result<(), ReadError> {
+        history.push(self.read(name, address)?);
+        let arena = &self.snapshot.arena;
+        let older = |at| AttributeRecord::older(arena, at).unwrap_or_default();
+        // Where the chain ends is up to its newest record: what the oldest leads to is gone.
+        let (mut count, mut address) = older(address);
+        self.snapshot.check()?;
+        while count > 0 {
+            history.push(self.read(name, address)?);
+            (_, address) = older(address);
+            count -= 1;
+        }
+        Ok(())
+    }
+
+    /// All attributes by id of their names, each after the older values of its history.
+    pub(crate) fn recorded(&self) -> Result<Vec<Attribute>, ReadError> {
+        let rows: Vec<u64> = self.rows()?.iter().map(Word::load).collect();
+        self.snapshot.check()?;
+        let mut recorded = Vec::new();
+        for (name, address) in rows.into_iter().map(record::split_row) {
+            let from = recorded.len();
+            self.append_history(AttributeId(name), address, &mut recorded)?;
+            recorded[from..].reverse();
+        }
+        Ok(recorded)
+    }
+
     /// The value of the attribute of that name, if it is there.
     ///
     /// # Errors

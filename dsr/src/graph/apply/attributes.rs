@@ -7,9 +7,45 @@ use crate::arena::record::{AttributeRecord, row, split_row};
 use crate::{AttributeId, NodeId, Owner, Refusal, Touch, TypeId, Value};
 
 impl Work<'_> {
+    /// Retires an attribute with its history.
     pub(super) fn retire_attribute(&mut self, address: Address) {
+        let (mut count, mut older) = self.older(address);
+        self.retire_record(address);
+        while count > 0 {
+            count -= 1;
+            let next = self.older(older).1;
+            self.retire_record(older);
+            older = next;
+        }
+    }
+
+    fn older(&self, address: Address) -> (u16, Address) {
+        AttributeRecord::older(&self.graph.writer.arena, address).unwrap_or_default()
+    }
+
+    fn retire_record(&mut self, address: Address) {
         let words = AttributeRecord::len(&self.graph.writer.arena, address);
         self.graph.writer.retire(address, words);
+    }
+
+    /// What the next record of an attribute leads to when it takes the place of the one at `old`: the
+    /// old one stays as history, and the oldest makes room for it.
+    fn next_older(&mut self, old: Address, limit: usize) -> (u16, Address) {
+        let (count, newest) = self.older(old);
+        let version = AttributeRecord::version(&self.graph.writer.arena, old);
+        if version == Some(self.stamp.version) {
+            // Nobody ever saw it.
+            self.retire_record(old);
+            return (count, newest);
+        }
+        if usize::from(count) + 1 < limit {
+            return (count + 1, old);
+        }
+        let oldest = (0..count).fold(old, |address, _| self.older(address).1);
+        if oldest != old {
+            self.retire_record(oldest);
+        }
+        (count, old)
     }
 
     /// The place in its index of an attribute in a node's table, where it has one.
@@ -57,21 +93,32 @@ impl Work<'_> {
     ) -> Result<AttributeId, Refusal> {
         let attribute = self.attribute_id(name)?;
         self.schema().check_value(attribute, value)?;
+        let at = rows.partition_point(|&r| split_row(r).0 < attribute.0);
+        let old = rows.get(at).map(|&r| split_row(r));
+        let old = old.filter(|(found, _)| *found == attribute.0);
+        let older = match (self.schema().history(attribute), old) {
+            (0, old) => {
+                if let Some((_, old)) = old {
+                    self.retire_attribute(old);
+                }
+                None
+            }
+            (_, None) => Some((0, 0)),
+            (limit, Some((_, old))) => Some(self.next_older(old, limit)),
+        };
         let record = AttributeRecord {
             value: value.clone(),
             version: self.stamp.version,
             time: self.stamp.time,
             writer: self.stamp.writer,
+            older,
         };
         let address = self.graph.writer.write(&record.words());
         let address = self.room(address)?;
-        let at = rows.partition_point(|&r| split_row(r).0 < attribute.0);
-        match rows.get(at).map(|&r| split_row(r)) {
-            Some((found, old)) if found == attribute.0 => {
-                self.retire_attribute(old);
-                rows[at] = row(attribute.0, address);
-            }
-            _ => rows.insert(at, row(attribute.0, address)),
+        if old.is_some() {
+            rows[at] = row(attribute.0, address);
+        } else {
+            rows.insert(at, row(attribute.0, address));
         }
         Ok(attribute)
     }

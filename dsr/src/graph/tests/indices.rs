@@ -87,6 +87,7 @@ pub(super) fn with_indices() -> Schema {
             min: None,
             max: None,
             index: true,
+            history: 0,
         };
         schema.add_attribute(attribute).unwrap();
     }
