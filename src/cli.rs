@@ -259,6 +259,21 @@ pub(crate) enum RulesAction {
         #[arg(long)]
         count: bool,
     },
+    /// Show in which order a rule's nodes are searched for, and what each step comes to
+    #[command(
+        after_help = "Example:\n  cortex rules explain rules.aggl --rule changeRoom --world world.json"
+    )]
+    Explain {
+        /// A grammar (.aggl)
+        file: PathBuf,
+        /// Only this rule [default: every rule]
+        #[arg(long, value_name = "R")]
+        rule: Option<String>,
+        /// A world to search: graph JSON, RoboComp DSR JSON or AGM model XML [default: none, with
+        /// assumed counts]
+        #[arg(long, value_name = "W")]
+        world: Option<PathBuf>,
+    },
     /// Show what applying a rule to a world would change; the file stays as it is
     #[command(
         after_help = "Example:\n  cortex rules apply rules.aggl --rule changeRoom \

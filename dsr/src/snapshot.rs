@@ -111,6 +111,11 @@ impl Snapshot {
         &self.schema
     }
 
+    /// The names in use, for who keeps them: versions whose names are the same share them.
+    pub fn shared_schema(&self) -> &Arc<Schema> {
+        &self.schema
+    }
+
     /// How many nodes there are.
     pub fn node_count(&self) -> u64 {
         self.root.node_count

@@ -18,6 +18,11 @@ impl Binding {
         Self(Vec::new())
     }
 
+    /// A binding of variables of which no two are the same.
+    pub(crate) fn of_distinct(pairs: impl Iterator<Item = (Name, NodeId)>) -> Self {
+        Self(pairs.collect())
+    }
+
     /// The node of this variable.
     pub fn get(&self, variable: &str) -> Option<NodeId> {
         self.0

@@ -6,6 +6,7 @@
 use crate::matching::Problem;
 use crate::{Binding, Constant, Goal, Grammar, MatchError, Matches, Obstacle, PatternNode};
 use dsr::{NodeId, ReadError, Snapshot};
+use std::sync::Arc;
 
 impl Goal {
     /// The nodes that its constants stand for.
@@ -92,15 +93,8 @@ impl Grammar {
     ) -> Result<Problem, MatchError> {
         let nodes: Vec<&PatternNode> = goal.pattern.nodes.iter().collect();
         let (edges, condition) = (&goal.pattern.edges, goal.precondition.as_ref());
-        self.problem(
-            snapshot,
-            "the goal",
-            &nodes,
-            &[],
-            edges,
-            condition,
-            constants,
-        )
+        let query = self.query(snapshot.schema(), &nodes, &[], edges, condition)?;
+        Arc::new(query).at("the goal", constants)
     }
 }
 

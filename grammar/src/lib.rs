@@ -90,7 +90,10 @@ pub use grammar::{
     Types,
 };
 pub use load::{Defects, Loader, has_errors, load_grammar, parse_goal, parse_grammar};
-pub use matching::{End, MatchError, Matches, Obstacle, ValueError};
+pub use matching::{
+    End, MatchDelta, MatchError, Matcher, Matches, Obstacle, RuleMatch, SearchPlan, SearchStep,
+    ValueError, Watch,
+};
 pub use number::Number;
 pub use parser::DEPTH_LIMIT;
 pub use rule::{

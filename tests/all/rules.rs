@@ -299,3 +299,41 @@ fn worlds_of_other_systems_are_matched_and_exported() {
         "{told}"
     );
 }
+
+#[test]
+fn explain_shows_the_search_and_what_it_came_across() {
+    let folder = Folder::new(&[("rules.aggl", RULES), ("world", WORLD)]);
+    let (code, out, _) = rules(
+        &folder,
+        "explain",
+        "rules.aggl",
+        &["--rule", "changeRoom", "--world"],
+    );
+    assert_eq!(code, 0);
+    let expected = "\
+changeRoom, by the graph's counts: cost 4.3
+    binds  from            candidates  passing  if
+    r a    every link `in`  1.0 (1)     1.0 (1)
+    b      connected of a  1.3 (2)     1.3 (2)
+";
+    assert_eq!(words_of(&out), words_of(expected));
+    let (code, out, _) = rules(&folder, "explain", "rules.aggl", &["--json", "--world"]);
+    assert_eq!(code, 0);
+    let plans: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(plans[1]["rule"], "big");
+    assert_eq!(plans[1]["steps"][0]["source"], "every room");
+    assert_eq!(
+        plans[1]["steps"][0]["found"],
+        json!({"candidates": 3, "passing": 2})
+    );
+    let (code, out, _) = rules(&folder, "explain", "rules.aggl", &["--rule", "big"]);
+    assert_eq!((code, out.contains("no world was given")), (0, true));
+}
+
+/// The words of a table, line by line.
+fn words_of(table: &str) -> Vec<Vec<&str>> {
+    table
+        .lines()
+        .map(|line| line.split_whitespace().collect())
+        .collect()
+}

@@ -3,26 +3,26 @@
 //! Guarantee: no choice is left out at which the quantified formula could come out otherwise than
 //! it does without it.
 
+use super::candidates::Candidates;
 use super::domain::Domain;
 use super::evaluate::{Environment, node};
+use super::host::Host;
 use super::program::{Link, Slot, Test};
-use dsr::{EdgeKey, NodeId, ReadError, Snapshot};
+use dsr::{NodeId, ReadError};
 
 /// Variables in neighbouring slots, and where their nodes are looked for.
-#[derive(Debug)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Choices {
     first: usize,
     variables: Vec<Variable>,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone, PartialEq)]
 struct Variable {
     domain: Domain,
     /// Only nodes that this link joins to a node bound before can matter.
     near: Option<Link>,
 }
-
-type Nodes<'a> = Box<dyn Iterator<Item = Result<NodeId, ReadError>> + 'a>;
 
 impl Choices {
     pub(crate) fn new(first: usize, domains: impl IntoIterator<Item = Domain>) -> Self {
@@ -49,32 +49,43 @@ impl Choices {
         }
     }
 
+    /// The link that joins what a slot's node is to a node bound before, if only such nodes can
+    /// matter.
+    pub(crate) fn near(&self, slot: usize) -> Option<Link> {
+        self.variables.get(slot.checked_sub(self.first)?)?.near
+    }
+
+    /// The slots of the variables, and what each ranges over.
+    pub(crate) fn domains(&self) -> impl Iterator<Item = (usize, &Domain)> {
+        (self.first..).zip(self.variables.iter().map(|variable| &variable.domain))
+    }
+
     /// Puts every choice that matters into the slots, until `visit` gives something. The slots
     /// keep the choice that it gave something for.
-    pub(crate) fn each<T, E: From<ReadError>>(
+    pub(crate) fn each<H: Host, T, E: From<ReadError>>(
         &self,
-        snapshot: &Snapshot,
+        host: &H,
         environment: &mut Environment,
         visit: &mut impl FnMut(&mut Environment) -> Result<Option<T>, E>,
     ) -> Result<Option<T>, E> {
-        self.descend(0, false, snapshot, environment, visit)
+        self.descend(0, false, host, environment, visit)
     }
 
     /// The same, by ascending ids.
-    pub(crate) fn each_in_order<T, E: From<ReadError>>(
+    pub(crate) fn each_in_order<H: Host, T, E: From<ReadError>>(
         &self,
-        snapshot: &Snapshot,
+        host: &H,
         environment: &mut Environment,
         visit: &mut impl FnMut(&mut Environment) -> Result<Option<T>, E>,
     ) -> Result<Option<T>, E> {
-        self.descend(0, true, snapshot, environment, visit)
+        self.descend(0, true, host, environment, visit)
     }
 
-    fn descend<T, E: From<ReadError>>(
+    fn descend<H: Host, T, E: From<ReadError>>(
         &self,
         index: usize,
         sorted: bool,
-        snapshot: &Snapshot,
+        host: &H,
         environment: &mut Environment,
         visit: &mut impl FnMut(&mut Environment) -> Result<Option<T>, E>,
     ) -> Result<Option<T>, E> {
@@ -82,15 +93,31 @@ impl Choices {
             return visit(environment);
         };
         let slot = self.first + index;
-        let mut nodes = variable.nodes(slot, snapshot, environment)?;
+        let nodes = variable.nodes(slot, host, environment)?;
+        let mut try_node = |id: NodeId| {
+            if variable.near.is_some()
+                && !host
+                    .type_of(id)?
+                    .is_some_and(|exact| variable.domain.contains(exact))
+            {
+                return Ok(None);
+            }
+            environment[slot] = Slot::Node(id);
+            self.descend(index + 1, sorted, host, environment, visit)
+        };
         if sorted {
             let mut all = nodes.collect::<Result<Vec<_>, _>>()?;
             all.sort_unstable();
-            nodes = Box::new(all.into_iter().map(Ok));
+            for (id, _) in all {
+                let found = try_node(id)?;
+                if found.is_some() {
+                    return Ok(found);
+                }
+            }
+            return Ok(None);
         }
         for id in nodes {
-            environment[slot] = Slot::Node(id?);
-            let found = self.descend(index + 1, sorted, snapshot, environment, visit)?;
+            let found = try_node(id?.0)?;
             if found.is_some() {
                 return Ok(found);
             }
@@ -100,38 +127,27 @@ impl Choices {
 }
 
 impl Variable {
-    fn nodes<'a>(
-        &'a self,
+    /// Where its nodes are; not all of them need be of its domain where they are near a link.
+    fn nodes<'h, H: Host>(
+        &self,
         slot: usize,
-        snapshot: &'a Snapshot,
+        host: &'h H,
         environment: &Environment,
-    ) -> Result<Nodes<'a>, ReadError> {
+    ) -> Result<Candidates<'h, H>, ReadError> {
         let Some(link) = self.near else {
-            return Ok(Box::new(self.domain.nodes(snapshot)));
+            return Ok(Candidates::members(host, self.domain.types()));
         };
         let inwards = link.from == slot;
         let other = node(environment, if inwards { link.to } else { link.from });
-        let other = other
-            .map(|id| snapshot.find_node(id))
-            .transpose()?
-            .flatten();
         let (Some(other), Some(label)) = (other, link.label) else {
-            return Ok(Box::new(std::iter::empty()));
+            return Ok(Candidates::Nothing);
         };
-        let fits = |id: NodeId| {
-            let found = snapshot.find_node(id)?;
-            Ok(found
-                .is_some_and(|found| self.domain.contains(found.type_id()))
-                .then_some(id))
-        };
-        let near = move |end: fn(EdgeKey) -> NodeId| {
-            move |key: Result<EdgeKey, ReadError>| key.and_then(|key| fits(end(key))).transpose()
-        };
-        Ok(if inwards {
-            Box::new(other.in_edges_of(label).filter_map(near(|key| key.from)))
+        let ids = if inwards {
+            host.sources(other, label)?
         } else {
-            Box::new(other.out_edges_of(label).filter_map(near(|key| key.to)))
-        })
+            host.targets(other, label)?
+        };
+        Ok(ids.map_or(Candidates::Nothing, Candidates::Ids))
     }
 }
 

@@ -4,20 +4,25 @@
 //! grammar's types block, or by both in turn.
 
 use crate::Types;
-use dsr::{NodeId, ReadError, Schema, Snapshot, TypeId};
+use dsr::{Schema, TypeId};
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// The exact types that a variable's type stands for, in a schema.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Domain {
     /// Ascending.
-    types: Vec<TypeId>,
-    /// Types of which the others are subtypes in the schema.
-    roots: Vec<TypeId>,
+    types: Arc<[TypeId]>,
+    /// Those of them below 64, one bit each.
+    low: u64,
 }
 
 impl Domain {
     pub(crate) fn new(types: &Types, schema: &Schema, type_name: &str) -> Self {
+        if types.is_empty() {
+            let by_schema = schema.find_type(type_name);
+            return Self::of(by_schema.map_or(&[], |id| schema.subtypes(id)));
+        }
         let mut names: BTreeSet<&str> = BTreeSet::from([type_name]);
         let mut members: BTreeSet<TypeId> = BTreeSet::new();
         let mut open = vec![type_name];
@@ -43,72 +48,40 @@ impl Domain {
                 }
             }
         }
-        Self::of(members.into_iter().collect(), schema)
+        Self::of(&members.into_iter().collect::<Vec<_>>())
     }
 
-    /// The domain of these types, ascending, of which every subtype is among them.
-    fn of(types: Vec<TypeId>, schema: &Schema) -> Self {
-        // Of types that inherit from each other (a circle), the first stands for all.
-        let covered = |&id: &TypeId| {
-            types.iter().any(|&other| {
-                other != id
-                    && schema.is_subtype(id, other)
-                    && !(schema.is_subtype(other, id) && id < other)
-            })
-        };
-        let roots = types.iter().copied().filter(|id| !covered(id)).collect();
-        Self { types, roots }
+    /// The domain of these types, ascending.
+    fn of(types: &[TypeId]) -> Self {
+        let low = types.iter().filter(|id| id.0 < 64);
+        Self {
+            low: low.fold(0, |bits, id| bits | 1 << id.0),
+            types: types.into(),
+        }
     }
 
     /// The types that belong to both.
-    pub(crate) fn and(&self, other: &Self, schema: &Schema) -> Self {
-        Self::of(
-            self.types
-                .iter()
-                .copied()
-                .filter(|&id| other.contains(id))
-                .collect(),
-            schema,
-        )
+    pub(crate) fn and(&self, other: &Self) -> Self {
+        let both = self.types.iter().filter(|&&id| other.contains(id));
+        Self::of(&both.copied().collect::<Vec<_>>())
     }
 
     /// Whether a node of this exact type belongs to it.
     pub(crate) fn contains(&self, exact: TypeId) -> bool {
-        self.types.binary_search(&exact).is_ok()
+        if exact.0 < 64 {
+            self.low >> exact.0 & 1 == 1
+        } else {
+            self.types.binary_search(&exact).is_ok()
+        }
+    }
+
+    /// Whether a node can belong to both.
+    pub(crate) fn meets(&self, other: &Self) -> bool {
+        self.low & other.low != 0 || self.types.iter().any(|&id| other.contains(id))
     }
 
     /// The exact types, ascending.
-    pub(crate) fn types(&self) -> &[TypeId] {
+    pub(crate) fn types(&self) -> &Arc<[TypeId]> {
         &self.types
-    }
-
-    /// How many nodes belong to it; where a type has several roots above it, more.
-    pub(crate) fn count(&self, snapshot: &Snapshot) -> Result<u64, ReadError> {
-        self.roots
-            .iter()
-            .try_fold(0, |sum, &root| Ok(sum + snapshot.count_of_type(root)?))
-    }
-
-    /// Every node that belongs to it, each once.
-    pub(crate) fn nodes<'a>(
-        &self,
-        snapshot: &'a Snapshot,
-    ) -> impl Iterator<Item = Result<NodeId, ReadError>> + use<'a> {
-        let roots = self.roots.clone();
-        (0..roots.len()).flat_map(move |index| {
-            let earlier = roots[..index].to_vec();
-            let schema = snapshot.schema();
-            snapshot
-                .nodes_of_type(roots[index])
-                .filter_map(move |node| match node {
-                    Ok(node) => {
-                        let seen = earlier
-                            .iter()
-                            .any(|&e| schema.is_subtype(node.type_id(), e));
-                        (!seen).then(|| Ok(node.id()))
-                    }
-                    Err(error) => Some(Err(error)),
-                })
-        })
     }
 }

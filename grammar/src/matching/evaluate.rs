@@ -3,9 +3,10 @@
 //! Guarantee: every formula has a truth value. A term that has no value (an attribute that is not
 //! there, a division by zero, an overflow) makes the comparison that it stands in not hold.
 
+use super::host::Host;
 use super::program::{Link, Slot, Term, Test};
 use crate::Number;
-use dsr::{EdgeKey, NodeId, ReadError, Snapshot, Value};
+use dsr::{EdgeKey, NodeId, ReadError, Value};
 
 /// What each slot stands for.
 pub(crate) type Environment = Vec<Slot>;
@@ -19,39 +20,39 @@ fn key(link: &Link, environment: &[Slot]) -> Option<EdgeKey> {
 }
 
 /// Whether the link is in the graph.
-pub(crate) fn is_there(
-    snapshot: &Snapshot,
+pub(crate) fn is_there<H: Host>(
+    host: &H,
     link: &Link,
     environment: &[Slot],
 ) -> Result<bool, ReadError> {
     match key(link, environment) {
-        Some(key) => Ok(snapshot.find_edge(key)?.is_some()),
+        Some(key) => host.has_edge(key),
         None => Ok(false),
     }
 }
 
 impl Test {
     /// Whether it holds. Quantified slots of the environment are overwritten.
-    pub(crate) fn holds(
+    pub(crate) fn holds<H: Host>(
         &self,
-        snapshot: &Snapshot,
+        host: &H,
         environment: &mut Environment,
     ) -> Result<bool, ReadError> {
         match self {
-            Self::Link(link) => Ok(is_there(snapshot, link, environment)? != link.negated),
+            Self::Link(link) => Ok(is_there(host, link, environment)? != link.negated),
             Self::Same(first, second) => {
                 let (first, second) = (environment[*first], environment[*second]);
                 Ok(first == second && first != Slot::Unbound)
             }
             Self::Compare(operator, left, right) => {
-                let left = left.value(snapshot, environment)?;
-                let right = right.value(snapshot, environment)?;
+                let left = left.value(host, environment)?;
+                let right = right.value(host, environment)?;
                 Ok(matches!((left, right), (Some(l), Some(r)) if operator.holds(&l, &r)))
             }
-            Self::Not(inner) => Ok(!inner.holds(snapshot, environment)?),
+            Self::Not(inner) => Ok(!inner.holds(host, environment)?),
             Self::All(tests) => {
                 for test in tests {
-                    if !test.holds(snapshot, environment)? {
+                    if !test.holds(host, environment)? {
                         return Ok(false);
                     }
                 }
@@ -59,7 +60,7 @@ impl Test {
             }
             Self::Any(tests) => {
                 for test in tests {
-                    if test.holds(snapshot, environment)? {
+                    if test.holds(host, environment)? {
                         return Ok(true);
                     }
                 }
@@ -67,15 +68,15 @@ impl Test {
             }
             Self::Exists(choices, body) => {
                 let mut found = |environment: &mut Environment| {
-                    Ok::<_, ReadError>(body.holds(snapshot, environment)?.then_some(()))
+                    Ok::<_, ReadError>(body.holds(host, environment)?.then_some(()))
                 };
-                Ok(choices.each(snapshot, environment, &mut found)?.is_some())
+                Ok(choices.each(host, environment, &mut found)?.is_some())
             }
             Self::Forall(choices, body) => {
                 let mut refuted = |environment: &mut Environment| {
-                    Ok::<_, ReadError>((!body.holds(snapshot, environment)?).then_some(()))
+                    Ok::<_, ReadError>((!body.holds(host, environment)?).then_some(()))
                 };
-                Ok(choices.each(snapshot, environment, &mut refuted)?.is_none())
+                Ok(choices.each(host, environment, &mut refuted)?.is_none())
             }
         }
     }
@@ -83,9 +84,9 @@ impl Test {
 
 impl Term {
     /// Its value, if it has one.
-    pub(crate) fn value(
+    pub(crate) fn value<H: Host>(
         &self,
-        snapshot: &Snapshot,
+        host: &H,
         environment: &[Slot],
     ) -> Result<Option<Value>, ReadError> {
         Ok(match self {
@@ -94,24 +95,18 @@ impl Term {
                 let (Slot::Node(node), Some(attribute)) = (environment[*node], *attribute) else {
                     return Ok(None);
                 };
-                let Some(node) = snapshot.find_node(node)? else {
-                    return Ok(None);
-                };
-                node.attribute(attribute)?.map(|attribute| attribute.value)
+                host.node_value(node, attribute)?
             }
             Self::EdgeAttribute { link, attribute } => {
                 let (Some(key), Some(attribute)) = (key(link, environment), *attribute) else {
                     return Ok(None);
                 };
-                let Some(edge) = snapshot.find_edge(key)? else {
-                    return Ok(None);
-                };
-                edge.attribute(attribute)?.map(|attribute| attribute.value)
+                host.edge_value(key, attribute)?
             }
             Self::Arithmetic(operator, operands) => {
                 let mut numbers = Vec::with_capacity(operands.len());
                 for operand in operands {
-                    let value = operand.value(snapshot, environment)?;
+                    let value = operand.value(host, environment)?;
                     let Some(number) = value.as_ref().and_then(Number::of) else {
                         return Ok(None);
                     };

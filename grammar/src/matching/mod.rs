@@ -2,26 +2,38 @@
 //!
 //! Guarantee: matching is injective and subtype-aware, and reads the snapshot in place.
 
+mod candidates;
 mod choice;
 mod domain;
 mod evaluate;
+mod explain;
+mod host;
+mod matcher;
 mod obstacle;
 mod plan;
+mod planned;
 mod program;
+mod query;
 mod search;
+mod statistics;
+mod watch;
 
+pub use explain::{SearchPlan, SearchStep};
+pub use matcher::Matcher;
 pub use obstacle::{End, Obstacle};
 pub use search::Matches;
+pub use watch::{MatchDelta, RuleMatch, Watch};
 
 pub(crate) use choice::Choices;
 pub(crate) use domain::Domain as MatchDomain;
 pub(crate) use evaluate::Environment;
 pub(crate) use obstacle::words;
 pub(crate) use program::{Compiler, Link, Slot, Term, Test};
-pub(crate) use search::Problem;
+pub(crate) use query::Problem;
 
 use crate::{Binding, Condition, Expression, Grammar, Number, PatternEdge, PatternNode, Rule};
 use dsr::{ReadError, Snapshot, Value};
+use std::sync::Arc;
 
 /// Why a match, condition or expression could not be looked at.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -35,6 +47,14 @@ pub enum MatchError {
     UnknownVariable {
         /// The variable.
         variable: String,
+    },
+    /// The grammar has no such rule.
+    #[error("no rule `{rule}`{}", did_you_mean(.suggestion.as_deref()))]
+    NoRule {
+        /// As asked for.
+        rule: String,
+        /// What was probably meant.
+        suggestion: Option<String>,
     },
     /// A binding has a variable that the rule does not have.
     #[error("rule `{rule}` has no variable `{variable}` to bind{}", did_you_mean(.suggestion.as_deref()))]
@@ -179,7 +199,8 @@ impl Grammar {
         let binding = kept
             .map(|(variable, node)| (variable.clone(), node))
             .collect();
-        let problem = self.problem(snapshot, &rule.name, &nodes, &[], &edges, None, &binding)?;
+        let query = self.query(snapshot.schema(), &nodes, &[], &edges, None)?;
+        let problem = Arc::new(query).at(&rule.name, &binding)?;
         if binding.len() == nodes.len() {
             return self.explain(snapshot, problem, &nodes, &edges, None);
         }
@@ -275,81 +296,8 @@ impl Grammar {
         rule: &Rule,
         binding: &Binding,
     ) -> Result<Problem, MatchError> {
-        let nodes: Vec<&PatternNode> = rule.bound_nodes().collect();
-        let (edges, condition) = (&rule.left.edges, rule.precondition.as_ref());
-        self.problem(
-            snapshot,
-            &rule.name,
-            &nodes,
-            &rule.parameters,
-            edges,
-            condition,
-            binding,
-        )
-    }
-
-    /// Compiles nodes, links and a condition, some of the nodes bound. Nodes that `narrowed`
-    /// names, too, must be of both types.
-    #[allow(
-        clippy::too_many_arguments,
-        reason = "a rule and a goal have these parts"
-    )]
-    pub(crate) fn problem(
-        &self,
-        snapshot: &Snapshot,
-        rule: &str,
-        nodes: &[&PatternNode],
-        narrowed: &[PatternNode],
-        edges: &[PatternEdge],
-        condition: Option<&Condition>,
-        binding: &Binding,
-    ) -> Result<Problem, MatchError> {
-        for (variable, _) in binding.iter() {
-            if !nodes.iter().any(|node| node.variable == *variable) {
-                let known = nodes.iter().map(|node| node.variable.as_str());
-                let suggestion = dsr::suggest(variable, known);
-                let (rule, variable) = (rule.to_owned(), variable.to_string());
-                return Err(MatchError::NotOfRule {
-                    rule,
-                    variable,
-                    suggestion,
-                });
-            }
-        }
-        let schema = snapshot.schema();
-        let mut compiler = Compiler::new(&self.types, schema);
-        let mut environment = Environment::new();
-        let mut domains = Vec::new();
-        for node in nodes {
-            compiler.declare(&node.variable);
-            let mut domain = compiler.domain(&node.type_name);
-            for also in narrowed
-                .iter()
-                .filter(|also| also.variable == node.variable)
-            {
-                domain = domain.and(&compiler.domain(&also.type_name), schema);
-            }
-            domains.push(domain);
-            let bound = binding.get(&node.variable);
-            environment.push(bound.map_or(Slot::Unbound, Slot::Node));
-        }
-        let links = edges
-            .iter()
-            .map(|edge| compiler.link(edge))
-            .collect::<Result<_, _>>()?;
-        let mut tests = Vec::new();
-        for condition in condition.into_iter().flat_map(conjuncts) {
-            tests.push(compiler.test(condition)?);
-        }
-        environment.resize(compiler.slots(), Slot::Unbound);
-        let variables = nodes.iter().map(|node| node.variable.clone()).collect();
-        Ok(Problem {
-            variables,
-            domains,
-            links,
-            tests,
-            environment,
-        })
+        let query = self.rule_query(snapshot.schema(), rule)?;
+        Arc::new(query).at(&rule.name, binding)
     }
 }
 

@@ -141,8 +141,8 @@ impl Grammar {
         if let Some(obstacle) = bound_nodes(snapshot, &problem, nodes)? {
             return Ok(Some(obstacle));
         }
-        let environment = &mut problem.environment;
-        for (edge, link) in edges.iter().zip(&problem.links) {
+        let Problem { query, environment } = &mut problem;
+        for (edge, link) in edges.iter().zip(&query.links) {
             if is_there(snapshot, link, environment)? != link.negated {
                 continue;
             }
@@ -160,10 +160,10 @@ impl Grammar {
             }));
         }
         let conditions = condition.into_iter().flat_map(conjuncts);
-        for (condition, test) in conditions.zip(&problem.tests) {
+        for (condition, test) in conditions.zip(&query.tests) {
             if !test.holds(snapshot, environment)? {
                 let mut compiler = Compiler::new(&self.types, snapshot.schema());
-                for variable in &problem.variables {
+                for variable in &query.variables {
                     compiler.declare(variable);
                 }
                 let mut words = Words {
@@ -196,7 +196,7 @@ fn bound_nodes(
         let Some(found) = snapshot.find_node(id)? else {
             return Ok(Some(Obstacle::NoNode { node: this }));
         };
-        if !problem.domains[slot].contains(found.type_id()) {
+        if !problem.query.domains[slot].contains(found.type_id()) {
             let (found, expected) = (found.type_name().to_owned(), pattern.type_name.to_string());
             return Ok(Some(Obstacle::WrongType {
                 node: this,

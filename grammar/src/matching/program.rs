@@ -6,6 +6,7 @@
 use super::MatchError;
 use super::choice::Choices;
 use super::domain::Domain;
+use super::query::Bound;
 use crate::{
     Arithmetic, AttributePath, Comparison, Condition, Expression, Literal, Name, PatternEdge,
     PatternNode, Types,
@@ -32,7 +33,7 @@ pub(crate) struct Compiler<'a> {
 }
 
 /// A compiled link of a pattern.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Link {
     pub(crate) from: usize,
     pub(crate) label: Option<LabelId>,
@@ -41,7 +42,7 @@ pub(crate) struct Link {
 }
 
 /// A compiled condition.
-#[derive(Debug)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Test {
     Link(Link),
     Same(usize, usize),
@@ -54,7 +55,7 @@ pub(crate) enum Test {
 }
 
 /// A compiled expression.
-#[derive(Debug)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Term {
     Constant(Value),
     NodeAttribute {
@@ -252,5 +253,13 @@ impl Term {
             Self::EdgeAttribute { link, .. } => link.from == slot || link.to == slot,
             Self::Arithmetic(_, operands) => operands.iter().any(|operand| operand.reads(slot)),
         }
+    }
+}
+
+impl Term {
+    /// Whether it is the attribute that a bound is about.
+    pub(crate) fn is_attribute_of(&self, bound: &Bound) -> bool {
+        matches!(self, Self::NodeAttribute { node, attribute }
+            if *node == bound.slot && *attribute == Some(bound.attribute))
     }
 }

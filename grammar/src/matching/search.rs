@@ -3,39 +3,27 @@
 //! Guarantee: every match comes exactly once, in an order that the graph and the plan alone
 //! determine; matches are injective.
 
-use super::domain::Domain;
-use super::evaluate::{Environment, is_there, node};
-use super::plan::{Source, Step, plan};
-use super::program::{Link, Slot, Test};
-use crate::{Binding, Name};
-use dsr::{EdgeKey, NodeId, ReadError, Snapshot};
+use super::candidates::Candidates;
+use super::evaluate::{is_there, node};
+use super::host::Host;
+use super::plan::{Plan, Source, plan};
+use super::program::Slot;
+use super::query::Problem;
+use super::statistics::Statistics;
+use crate::Binding;
+use dsr::{NodeId, ReadError, Snapshot};
 use std::fmt;
+use std::sync::Arc;
 
-/// A pattern and conditions, ready to be looked for.
+/// A search under way.
 #[derive(Debug)]
-pub(crate) struct Problem {
-    /// Variables by slot.
-    pub(crate) variables: Vec<Name>,
-    /// By slot.
-    pub(crate) domains: Vec<Domain>,
-    pub(crate) links: Vec<Link>,
-    pub(crate) tests: Vec<Test>,
-    /// At least one slot per variable, more for quantified ones.
-    pub(crate) environment: Environment,
-}
-
-/// One or two nodes for the slots that a step binds.
-type Candidate = (NodeId, Option<NodeId>);
-type Candidates<'a> = Box<dyn Iterator<Item = Result<Candidate, ReadError>> + 'a>;
-
-/// The matches of a rule or goal, found one at a time.
-///
-/// Ends after the first [`ReadError`] (a snapshot that became too old, say).
-pub struct Matches<'a> {
-    snapshot: &'a Snapshot,
+pub(crate) struct Search<'h, H: Host> {
+    host: &'h H,
     problem: Problem,
-    steps: Vec<Step>,
-    levels: Vec<Candidates<'a>>,
+    plan: Arc<Plan>,
+    levels: Vec<Candidates<'h, H>>,
+    /// By step, how many candidates there were, and how many of them passed.
+    seen: Vec<[u64; 2]>,
     state: State,
 }
 
@@ -46,206 +34,259 @@ enum State {
     Done,
 }
 
-impl fmt::Debug for Matches<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Matches")
-            .field("problem", &self.problem)
-            .field("steps", &self.steps)
-            .field("state", &self.state)
-            .finish_non_exhaustive()
-    }
-}
-
-impl<'a> Matches<'a> {
-    pub(crate) fn new(snapshot: &'a Snapshot, problem: Problem) -> Result<Self, ReadError> {
-        let given: Vec<usize> = (0..problem.variables.len())
-            .filter(|&slot| node(&problem.environment, slot).is_some())
-            .collect();
-        let Problem {
-            domains,
-            links,
-            tests,
-            ..
-        } = &problem;
-        let steps = plan(snapshot, domains, links, tests, &problem.environment)?;
-        let mut matches = Self {
-            snapshot,
+impl<'h, H: Host> Search<'h, H> {
+    /// A search by a plan that was made for the problem's query and given slots.
+    pub(crate) fn new(host: &'h H, problem: Problem, plan: Arc<Plan>) -> Self {
+        Self {
+            host,
             problem,
-            steps,
-            levels: Vec::new(),
+            levels: Vec::with_capacity(plan.steps.len()),
+            seen: vec![[0; 2]; plan.steps.len()],
+            plan,
             state: State::Fresh,
-        };
-        if !matches.given_holds(&given)? {
-            matches.state = State::Done;
         }
-        Ok(matches)
     }
 
     /// What can be said of the slots that are bound from the start.
-    fn given_holds(&mut self, given: &[usize]) -> Result<bool, ReadError> {
-        for (index, &slot) in given.iter().enumerate() {
-            if !self.fits(slot, &given[..index])? {
-                return Ok(false);
-            }
-        }
-        let all_given = |slots: [usize; 2]| slots.iter().all(|slot| given.contains(slot));
-        for link in &self.problem.links {
-            if all_given([link.from, link.to])
-                && is_there(self.snapshot, link, &self.problem.environment)? == link.negated
+    fn given_holds(&mut self) -> Result<bool, ReadError> {
+        let Self {
+            host,
+            problem,
+            plan,
+            ..
+        } = self;
+        let Problem { query, environment } = problem;
+        for (index, &slot) in plan.given.iter().enumerate() {
+            let others = &plan.given[..index];
+            if others
+                .iter()
+                .any(|&other| environment[other] == environment[slot])
             {
                 return Ok(false);
             }
+            let Some(id) = node(environment, slot) else {
+                return Ok(false);
+            };
+            let exact = host.type_of(id)?;
+            if !exact.is_some_and(|exact| query.domains[slot].contains(exact)) {
+                return Ok(false);
+            }
         }
-        let Problem {
-            variables,
-            tests,
-            environment,
-            ..
-        } = &mut self.problem;
-        for test in &*tests {
-            let ready = (0..variables.len()).all(|slot| given.contains(&slot) || !test.reads(slot));
-            if ready && !test.holds(self.snapshot, environment)? {
+        for &link in &plan.links {
+            let link = &query.links[link];
+            if is_there(*host, link, environment)? == link.negated {
+                return Ok(false);
+            }
+        }
+        for &test in &plan.tests {
+            if !query.tests[test].holds(*host, environment)? {
                 return Ok(false);
             }
         }
         Ok(true)
     }
 
-    /// Whether the slot's node is there, of its type, and none of the others.
-    fn fits(&self, slot: usize, others: &[usize]) -> Result<bool, ReadError> {
-        let environment = &self.problem.environment;
-        if others
-            .iter()
-            .any(|&other| environment[other] == environment[slot])
-        {
-            return Ok(false);
-        }
-        let Some(id) = node(environment, slot) else {
-            return Ok(false);
-        };
-        let found = self.snapshot.find_node(id)?;
-        Ok(found.is_some_and(|node| self.problem.domains[slot].contains(node.type_id())))
-    }
-
-    fn candidates(&self, depth: usize) -> Result<Candidates<'a>, ReadError> {
-        let snapshot = self.snapshot;
-        let environment = &self.problem.environment;
-        let nothing = || -> Candidates<'a> { Box::new(std::iter::empty()) };
-        let one = |id: NodeId| (id, None);
-        Ok(match self.steps[depth].source {
-            Source::Nodes { slot } => Box::new(
-                self.problem.domains[slot]
-                    .nodes(snapshot)
-                    .map(move |id| id.map(one)),
-            ),
-            Source::Edges { link } => match self.problem.links[link].label {
-                Some(label) => Box::new(
-                    snapshot
-                        .edges_of_label(label)
-                        .map(|key| key.map(|key| (key.from, Some(key.to)))),
-                ),
-                None => nothing(),
-            },
+    fn candidates(&self, depth: usize) -> Result<Candidates<'h, H>, ReadError> {
+        let host = self.host;
+        let Problem { query, environment } = &self.problem;
+        let ids = match self.plan.steps[depth].source {
+            Source::Nodes { slot } => {
+                return Ok(Candidates::members(host, query.domains[slot].types()));
+            }
+            Source::Edges { link } => {
+                let label = query.links[link].label;
+                return Ok(label.map_or(Candidates::Nothing, |label| {
+                    Candidates::Edges(host.edges(label))
+                }));
+            }
+            Source::Values { bound } => {
+                let bound = &query.bounds[bound];
+                Some(host.by_value(bound.attribute, &bound.range))
+            }
             Source::Out { link } => {
-                let link = self.problem.links[link];
-                let (Some(from), Some(label)) = (node(environment, link.from), link.label) else {
-                    return Ok(nothing());
-                };
-                let Some(from) = snapshot.find_node(from)? else {
-                    return Ok(nothing());
-                };
-                let edges = from.out_edges_of(label);
-                Box::new(edges.map(move |key| key.map(|key: EdgeKey| one(key.to))))
+                let link = query.links[link];
+                match (node(environment, link.from), link.label) {
+                    (Some(from), Some(label)) => host.targets(from, label)?,
+                    _ => None,
+                }
             }
             Source::In { link } => {
-                let link = self.problem.links[link];
-                let (Some(to), Some(label)) = (node(environment, link.to), link.label) else {
-                    return Ok(nothing());
-                };
-                let Some(to) = snapshot.find_node(to)? else {
-                    return Ok(nothing());
-                };
-                let edges = to.in_edges_of(label);
-                Box::new(edges.map(move |key| key.map(|key: EdgeKey| one(key.from))))
+                let link = query.links[link];
+                match (node(environment, link.to), link.label) {
+                    (Some(to), Some(label)) => host.sources(to, label)?,
+                    _ => None,
+                }
             }
-        })
+        };
+        Ok(ids.map_or(Candidates::Nothing, Candidates::Ids))
     }
 
     /// Puts a candidate into its slots and tests what can be tested now.
-    fn accept(&mut self, depth: usize, candidate: Candidate) -> Result<bool, ReadError> {
-        let step = &self.steps[depth];
-        let slots = step.source.binds(&self.problem.links);
-        let nodes = [Some(candidate.0), candidate.1];
-        for (slot, node) in slots.iter().zip(nodes) {
-            if let (Some(slot), Some(node)) = (slot, node) {
-                self.problem.environment[*slot] = Slot::Node(node);
-            }
-        }
-        if let [Some(first), Some(second)] = slots
-            && self.problem.environment[first] == self.problem.environment[second]
-        {
+    fn accept(
+        &mut self,
+        depth: usize,
+        (first, second): (NodeId, Option<NodeId>),
+    ) -> Result<bool, ReadError> {
+        let Self {
+            host,
+            problem,
+            plan,
+            ..
+        } = self;
+        let Problem { query, environment } = problem;
+        let step = &plan.steps[depth];
+        if second == Some(first) {
             return Ok(false);
         }
-        for slot in slots.into_iter().flatten() {
-            if !self.fits(slot, &step.bound)? {
+        for (index, id) in [Some(first), second].into_iter().enumerate() {
+            let (Some(slot), Some(id)) = (step.binds[index], id) else {
+                continue;
+            };
+            let taken = Slot::Node(id);
+            if step.others[index]
+                .iter()
+                .any(|&other| environment[other] == taken)
+            {
+                return Ok(false);
+            }
+            environment[slot] = taken;
+        }
+        if step.typed {
+            for (slot, id) in step.binds.iter().zip([Some(first), second]) {
+                if let (Some(slot), Some(id)) = (slot, id)
+                    && !host
+                        .type_of(id)?
+                        .is_some_and(|exact| query.domains[*slot].contains(exact))
+                {
+                    return Ok(false);
+                }
+            }
+        }
+        for &link in &step.links {
+            let link = &query.links[link];
+            if is_there(*host, link, environment)? == link.negated {
                 return Ok(false);
             }
         }
-        for &index in &step.links {
-            let link = &self.problem.links[index];
-            if is_there(self.snapshot, link, &self.problem.environment)? == link.negated {
-                return Ok(false);
-            }
-        }
-        let Problem {
-            tests, environment, ..
-        } = &mut self.problem;
-        for &index in &step.tests {
-            if !tests[index].holds(self.snapshot, environment)? {
+        for &test in &step.tests {
+            if !query.tests[test].holds(*host, environment)? {
                 return Ok(false);
             }
         }
         Ok(true)
     }
 
-    /// Where each step of the plan finds its candidates.
-    #[cfg(test)]
-    pub(super) fn sources(&self) -> impl Iterator<Item = String> {
-        self.steps.iter().map(|step| format!("{:?}", step.source))
+    /// Goes to the next match; `false` where there is none. After that, and after an error, there
+    /// is none any more.
+    pub(crate) fn advance(&mut self) -> Result<bool, ReadError> {
+        let found = self.try_advance();
+        if !matches!(found, Ok(true)) {
+            self.state = State::Done;
+        }
+        found
     }
 
-    fn advance(&mut self) -> Result<Option<Binding>, ReadError> {
-        if self.state == State::Fresh {
-            self.state = State::Running;
-            if self.steps.is_empty() {
-                self.state = State::Done;
-                return Ok(Some(self.binding()));
+    fn try_advance(&mut self) -> Result<bool, ReadError> {
+        match self.state {
+            State::Done => return Ok(false),
+            State::Running => {}
+            State::Fresh => {
+                self.state = State::Running;
+                if !self.given_holds()? {
+                    return Ok(false);
+                }
+                if self.plan.steps.is_empty() {
+                    return Ok(true);
+                }
+                let first = self.candidates(0)?;
+                self.levels.push(first);
             }
-            let first = self.candidates(0)?;
-            self.levels.push(first);
         }
         while let Some(depth) = self.levels.len().checked_sub(1) {
             let Some(candidate) = self.levels[depth].next() else {
                 self.levels.pop();
                 continue;
             };
+            self.seen[depth][0] += 1;
             if !self.accept(depth, candidate?)? {
                 continue;
             }
-            if depth + 1 == self.steps.len() {
-                return Ok(Some(self.binding()));
+            self.seen[depth][1] += 1;
+            if depth + 1 == self.plan.steps.len() {
+                return Ok(true);
             }
             let next = self.candidates(depth + 1)?;
             self.levels.push(next);
         }
-        Ok(None)
+        Ok(false)
+    }
+
+    /// By step, how many candidates there were so far, and how many of them passed.
+    pub(crate) fn seen(&self) -> &[[u64; 2]] {
+        &self.seen
+    }
+
+    /// The nodes of the match that [`Self::advance`] went to, by slot.
+    pub(crate) fn nodes(&self) -> impl Iterator<Item = NodeId> {
+        let variables = self.problem.query.variables.len();
+        (0..variables).filter_map(|slot| node(&self.problem.environment, slot))
     }
 
     fn binding(&self) -> Binding {
-        let nodes = self.problem.variables.iter().enumerate();
-        nodes
-            .filter_map(|(slot, name)| Some((name.clone(), node(&self.problem.environment, slot)?)))
-            .collect()
+        let variables = self.problem.query.variables.iter();
+        Binding::of_distinct(variables.cloned().zip(self.nodes()))
+    }
+}
+
+/// The matches of a rule or goal, found one at a time.
+///
+/// Ends after the first [`ReadError`] (a snapshot that became too old, say).
+pub struct Matches<'a> {
+    search: Search<'a, Snapshot>,
+}
+
+impl fmt::Debug for Matches<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Matches")
+            .field("plan", &self.search.plan)
+            .field("state", &self.search.state)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<'a> Matches<'a> {
+    pub(crate) fn new(snapshot: &'a Snapshot, problem: Problem) -> Result<Self, ReadError> {
+        let statistics = Statistics::of(snapshot, &problem.query)?;
+        let plan = plan(&problem.query, &statistics, &problem.given());
+        Ok(Self::by_plan(snapshot, problem, Arc::new(plan)))
+    }
+
+    pub(crate) fn by_plan(snapshot: &'a Snapshot, problem: Problem, plan: Arc<Plan>) -> Self {
+        Self {
+            search: Search::new(snapshot, problem, plan),
+        }
+    }
+
+    /// Counts the matches that are left.
+    ///
+    /// # Errors
+    /// [`ReadError`], which ends the search.
+    pub fn count_all(mut self) -> Result<u64, ReadError> {
+        let mut count = 0;
+        while self.search.advance()? {
+            count += 1;
+        }
+        Ok(count)
+    }
+
+    /// Where each step of the plan finds its candidates.
+    #[cfg(test)]
+    pub(super) fn sources(&self) -> impl Iterator<Item = String> {
+        self.search
+            .plan
+            .steps
+            .iter()
+            .map(|step| format!("{:?}", step.source))
     }
 }
 
@@ -253,13 +294,10 @@ impl Iterator for Matches<'_> {
     type Item = Result<Binding, ReadError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if self.state == State::Done {
-            return None;
+        match self.search.advance() {
+            Ok(true) => Some(Ok(self.search.binding())),
+            Ok(false) => None,
+            Err(error) => Some(Err(error)),
         }
-        let next = self.advance();
-        if !matches!(next, Ok(Some(_))) {
-            self.state = State::Done;
-        }
-        next.transpose()
     }
 }

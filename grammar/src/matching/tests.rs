@@ -248,3 +248,106 @@ fn a_robot_is_followed_into_its_room_however_many_people_are_in_rooms() {
     );
     assert_eq!(matches.count(), 1);
 }
+
+/// A crowd of nodes `p0`, `p1`, ... of type `person`, each with the number as its attribute `n`,
+/// which has an index.
+fn numbered(count: i64) -> dsr::Graph {
+    let schema = "[types]\nperson = []\n[attributes]\nn = { kind = \"i64\", index = true }\n";
+    let mut graph = dsr::Graph::in_memory(dsr::Schema::from_toml("schema", schema).unwrap());
+    let mut transaction = dsr::Transaction::new();
+    for n in 0..count {
+        transaction.create_node("person", &format!("p{n}"), vec![("n".into(), n.into())]);
+    }
+    graph
+        .commit(&transaction, "test", dsr::Time::default())
+        .unwrap();
+    graph
+}
+
+#[test]
+fn a_constant_is_looked_up_where_the_attribute_has_an_index() {
+    let crowd = numbered(500);
+    let snapshot = crowd.snapshot();
+    for (condition, expected, from) in [
+        ("(= a.n 123)", 1, "index of n = 123"),
+        ("(= 123.0 a.n)", 1, "index of n = 123"),
+        ("(and (> 3 a.n) (!= a.n 1))", 2, "index of n from -inf to 3"),
+        ("(>= a.n 490)", 10, "index of n from 490 to inf"),
+        ("(!= a.n 7)", 499, "every person"),
+        ("(= a.n \"7\")", 0, "index of n = \"7\""),
+    ] {
+        let grammar = rule(&format!(
+            "{{ a:person }} => {{ a:person }} precondition {{ {condition} }}"
+        ));
+        let found = grammar
+            .matches(&snapshot, &grammar.rules[0], &Binding::new())
+            .unwrap();
+        assert_eq!(found.count_all(), Ok(expected), "{condition}");
+        let plan = grammar.search_plan(Some(&snapshot), &grammar.rules[0], &Binding::new());
+        let step = plan.unwrap().steps.remove(0);
+        assert_eq!(step.source, from);
+        let [looked_at, passed] = step.found.unwrap();
+        assert_eq!(passed, expected, "{condition}");
+        assert!(
+            looked_at <= expected + 2,
+            "{condition}: {looked_at} candidates"
+        );
+    }
+}
+
+#[test]
+fn a_plan_is_kept_until_a_count_has_doubled() {
+    let names: Vec<String> = (0..60).map(|index| format!("p{index}")).collect();
+    let mut nodes = vec![("robot", "r0"), ("room", "hall")];
+    nodes.extend(names.iter().map(|name| ("person", name.as_str())));
+    let mut links = vec![("r0", "in", "hall")];
+    links.extend(names.iter().map(|name| (name.as_str(), "in", "hall")));
+    let mut world = graph(&nodes, &links);
+    let grammar = rule("{ r:robot a:room r->a(in) } => { r:robot a:room }");
+    let mut matcher = Matcher::new(std::sync::Arc::new(grammar));
+    let mut plan_at = |robots: std::ops::Range<usize>, rooms: std::ops::Range<usize>| {
+        let mut more = dsr::Transaction::new();
+        for number in robots {
+            more.create_node("robot", &format!("r{number}"), vec![]);
+            more.create_edge(format!("r{number}").as_str(), "in", "hall");
+        }
+        for number in rooms {
+            more.create_node("room", &format!("room{number}"), vec![]);
+        }
+        world.commit(&more, "test", dsr::Time::default()).unwrap();
+        let snapshot = world.snapshot();
+        let matches = matcher.matches(&snapshot, "r", &Binding::new()).unwrap();
+        let sources: Vec<String> = matches.sources().collect();
+        let count = matches.count_all().unwrap();
+        (sources.join(" "), count)
+    };
+    let from_robots = "Nodes { slot: 0 } Out { link: 0 }";
+    let from_links = "Edges { link: 0 }";
+    assert_eq!(plan_at(1..20, 0..60), (from_robots.to_owned(), 20));
+    assert_eq!(plan_at(20..38, 0..0), (from_robots.to_owned(), 38));
+    assert_eq!(plan_at(38..200, 0..0), (from_links.to_owned(), 200));
+}
+
+#[test]
+fn counts_of_triples_find_the_start_that_counts_of_types_and_labels_miss() {
+    // Many persons and many cups, many links `by`, but only three from a cup to a person.
+    let names: Vec<String> = (0..300).map(|index| format!("p{index}")).collect();
+    let cups: Vec<String> = (0..300).map(|index| format!("c{index}")).collect();
+    let mut nodes: Vec<(&str, &str)> = names.iter().map(|name| ("person", name.as_str())).collect();
+    nodes.extend(cups.iter().map(|name| ("cup", name.as_str())));
+    let mut links: Vec<(&str, &str, &str)> = Vec::new();
+    for index in 0..299 {
+        links.push((&names[index], "by", &names[index + 1]));
+        links.push((&cups[index], "by", &cups[index + 1]));
+        links.push((&names[index], "on", &cups[index]));
+    }
+    links.extend((7..10).map(|index| (&*cups[index], "by", &*names[index])));
+    let crowd = graph(&nodes, &links);
+    let snapshot = crowd.snapshot();
+    let grammar = rule("{ p:person q:person c:cup p->q(by) q->c(on) c->q(by) } => { }");
+    let plan = grammar.search_plan(Some(&snapshot), &grammar.rules[0], &Binding::new());
+    let plan = plan.unwrap();
+    assert!(plan.steps[1].found.unwrap()[1] <= 3, "{plan:#?}");
+    let candidates: u64 = plan.steps.iter().map(|step| step.found.unwrap()[0]).sum();
+    assert!(candidates < 1000, "{plan:#?}");
+}

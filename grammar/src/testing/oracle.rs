@@ -26,7 +26,7 @@ const PARENTS: [(&str, &[&str]); 7] = [
     ("gear", &[]),
 ];
 /// All but `gear`, which only the grammar knows.
-const NODE_TYPES: [&str; 6] = ["thing", "box", "cup", "mug", "tool", "pot"];
+pub(crate) const NODE_TYPES: [&str; 6] = ["thing", "box", "cup", "mug", "tool", "pot"];
 /// Of these, what the types block adds to the schema.
 pub(crate) const TYPES: &str = "name=t\n===\ntypes {\n(thing gear)\n(cup : box)\n(mug : cup)\n\
                                 (box : thing gear)\n(tool : gear)\n(pot : tool)\n}\n===\n";

@@ -2,6 +2,7 @@
 //! what they would change there. Nothing here writes to any file.
 
 mod apply;
+mod explain;
 
 use super::graph::read_graph;
 use super::output::{print, print_json, tell};
@@ -27,6 +28,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
             world,
             count,
         } => matches(file, rule.as_deref(), world, *count, json),
+        RulesAction::Explain { file, rule, world } => {
+            explain::explain(file, rule.as_deref(), world.as_deref(), json)
+        }
         RulesAction::Apply {
             file,
             rule,
@@ -295,18 +299,17 @@ fn find(grammar: &Grammar, snapshot: &Snapshot, rule: &Rule, keep: bool) -> Resu
         reason = "the verb tells how long matching took"
     )]
     let started = Instant::now();
-    let mut matches = Vec::new();
-    let mut count = 0;
-    for found in grammar
+    let search = grammar
         .matches(snapshot, rule, &Binding::new())
-        .map_err(Failure::internal)?
-    {
-        let found = found.map_err(Failure::internal)?;
-        count += 1;
-        if keep {
-            matches.push(found);
-        }
-    }
+        .map_err(Failure::internal)?;
+    let (count, matches) = if keep {
+        let matches: Vec<Binding> = search
+            .collect::<Result<_, _>>()
+            .map_err(Failure::internal)?;
+        (matches.len() as u64, matches)
+    } else {
+        (search.count_all().map_err(Failure::internal)?, Vec::new())
+    };
     Ok(Found {
         count,
         matches,

@@ -1,0 +1,219 @@
+//! Search plans for people.
+//!
+//! Guarantee: what is shown is the plan that a search for the same rule in the same snapshot goes
+//! by.
+
+use super::plan::{Plan, Source, plan};
+use super::query::{Problem, Query};
+use super::search::Search;
+use super::statistics::Statistics;
+use super::{MatchError, conjuncts};
+use crate::{Binding, Condition, Effect, Grammar, Pattern, Rule};
+use dsr::{Schema, Snapshot, ValueRange};
+use std::sync::Arc;
+
+/// How the matches of a rule are searched for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SearchPlan {
+    /// The rule.
+    pub rule: String,
+    /// Links and conditions on the nodes that are given, looked at first.
+    pub checks: Vec<String>,
+    /// In order.
+    pub steps: Vec<SearchStep>,
+    /// Candidates and checks expected in a whole search.
+    pub cost: f64,
+    /// Whether the counts are the graph's own, not what is taken for granted where there is none:
+    /// a hundred nodes of a type, two links of a label at each.
+    pub counted: bool,
+}
+
+/// One step of a search: candidates for one variable, or for both ends of a link.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SearchStep {
+    /// Variables that it binds.
+    pub binds: Vec<String>,
+    /// Where candidates come from.
+    pub source: String,
+    /// Links and conditions looked at for each.
+    pub checks: Vec<String>,
+    /// Candidates expected in a whole search.
+    pub candidates: f64,
+    /// How many of them are expected to pass.
+    pub passing: f64,
+    /// Candidates that a whole search had, and how many of them passed.
+    pub found: Option<[u64; 2]>,
+}
+
+impl Grammar {
+    /// The plan by which [`Self::matches`] searches a snapshot, with what a whole search comes
+    /// across; without a snapshot, the plan for a graph of which nothing is known.
+    ///
+    /// # Errors
+    /// [`MatchError`], as for [`Self::matches`].
+    pub fn search_plan(
+        &self,
+        snapshot: Option<&Snapshot>,
+        rule: &Rule,
+        partial: &Binding,
+    ) -> Result<SearchPlan, MatchError> {
+        let assumed;
+        let schema = match snapshot {
+            Some(snapshot) => snapshot.schema(),
+            None => {
+                assumed = self.schema_of_names();
+                &assumed
+            }
+        };
+        let problem = Arc::new(self.rule_query(schema, rule)?).at(&rule.name, partial)?;
+        let query = Arc::clone(&problem.query);
+        let statistics = match snapshot {
+            Some(snapshot) => Statistics::of(snapshot, &query)?,
+            None => Statistics::assumed(&query),
+        };
+        let plan = Arc::new(plan(&query, &statistics, &problem.given()));
+        let seen = snapshot.map(|snapshot| run(snapshot, problem, &plan));
+        let seen = seen.transpose()?;
+        let words = Words {
+            rule,
+            query: &query,
+            schema,
+        };
+        let steps = plan.steps.iter().enumerate().map(|(index, step)| {
+            let binds = step.binds.iter().flatten();
+            SearchStep {
+                binds: binds
+                    .map(|&slot| query.variables[slot].to_string())
+                    .collect(),
+                source: words.source(step.source),
+                checks: words.checks(&step.links, &step.tests),
+                candidates: step.candidates,
+                passing: step.passing,
+                found: seen.as_ref().map(|seen| seen[index]),
+            }
+        });
+        Ok(SearchPlan {
+            rule: rule.name.to_string(),
+            checks: words.checks(&plan.links, &plan.tests),
+            steps: steps.collect(),
+            cost: plan.cost,
+            counted: snapshot.is_some(),
+        })
+    }
+
+    /// A schema that has every name of the grammar, so that nothing is known to be missing.
+    fn schema_of_names(&self) -> Schema {
+        let mut schema = Schema::open();
+        let mut add = |node: Option<&str>, label: Option<&str>| {
+            // A name that no schema can have is in no graph.
+            let _ = node.map(|name| schema.add_type(name, &[]));
+            let _ = label.map(|name| schema.add_label(name, &[], &[]));
+        };
+        for name in self.types.names().chain(self.types.undeclared()) {
+            add(Some(name), None);
+        }
+        for rule in &self.rules {
+            for side in [&rule.left, &rule.right] {
+                pattern_names(side, &mut add);
+            }
+            for parameter in &rule.parameters {
+                add(Some(&parameter.type_name), None);
+            }
+            if let Some(condition) = &rule.precondition {
+                condition_names(condition, &mut add);
+            }
+            for effect in &rule.effect {
+                if let Effect::When { condition, .. } = effect {
+                    condition_names(condition, &mut add);
+                }
+            }
+        }
+        schema
+    }
+}
+
+type Add<'a> = dyn FnMut(Option<&str>, Option<&str>) + 'a;
+
+fn pattern_names(pattern: &Pattern, add: &mut Add<'_>) {
+    for node in &pattern.nodes {
+        add(Some(&node.type_name), None);
+    }
+    for edge in &pattern.edges {
+        add(None, Some(&edge.label));
+    }
+}
+
+fn condition_names(condition: &Condition, add: &mut Add<'_>) {
+    match condition {
+        Condition::Edge { label, .. } => add(None, Some(label)),
+        Condition::Same(..) | Condition::Compare { .. } => {}
+        Condition::Not(inner) => condition_names(inner, add),
+        Condition::And(all) | Condition::Or(all) => {
+            for inner in all {
+                condition_names(inner, add);
+            }
+        }
+        Condition::Exists { variables, body } | Condition::Forall { variables, body } => {
+            for variable in variables {
+                add(Some(&variable.type_name), None);
+            }
+            condition_names(body, add);
+        }
+        Condition::When {
+            condition,
+            consequence,
+        } => {
+            condition_names(condition, add);
+            condition_names(consequence, add);
+        }
+    }
+}
+
+/// A whole search; by step, how many candidates there were and how many passed.
+fn run(
+    snapshot: &Snapshot,
+    problem: Problem,
+    plan: &Arc<Plan>,
+) -> Result<Vec<[u64; 2]>, MatchError> {
+    let mut search = Search::new(snapshot, problem, Arc::clone(plan));
+    while search.advance()? {}
+    Ok(search.seen().to_vec())
+}
+
+struct Words<'a> {
+    rule: &'a Rule,
+    query: &'a Query,
+    schema: &'a Schema,
+}
+
+impl Words<'_> {
+    fn source(&self, source: Source) -> String {
+        let nodes: Vec<_> = self.rule.bound_nodes().collect();
+        let edges = &self.rule.left.edges;
+        match source {
+            Source::Nodes { slot } => format!("every {}", nodes[slot].type_name),
+            Source::Edges { link } => format!("every link `{}`", edges[link].label),
+            Source::Out { link } => format!("{} of {}", edges[link].label, edges[link].from),
+            Source::In { link } => format!("{} to {}", edges[link].label, edges[link].to),
+            Source::Values { bound } => {
+                let bound = &self.query.bounds[bound];
+                let attribute = self.schema.attribute_name(bound.attribute);
+                let range = match &bound.range {
+                    ValueRange::Equal(value) => format!("= {}", super::words(value)),
+                    ValueRange::Between(from, to) => format!("from {from} to {to}"),
+                };
+                format!("index of {attribute} {range}")
+            }
+        }
+    }
+
+    fn checks(&self, links: &[usize], tests: &[usize]) -> Vec<String> {
+        let condition = self.rule.precondition.as_ref();
+        let conditions: Vec<&Condition> = condition.into_iter().flat_map(conjuncts).collect();
+        let links = links
+            .iter()
+            .map(|&link| self.rule.left.edges[link].to_string());
+        let tests = tests.iter().map(|&test| conditions[test].to_string());
+        links.chain(tests).collect()
+    }
+}

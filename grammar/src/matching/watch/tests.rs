@@ -1,0 +1,232 @@
+//! A watch against fresh searches, however the graph changes.
+
+use super::*;
+use crate::testing::oracle::{Model, NODE_TYPES, TYPES};
+use crate::testing::random::FEW;
+use crate::testing::repair::repaired;
+use crate::testing::{graph, read, rule};
+use crate::{has_errors, parse_grammar};
+use dsr::{EdgeRef, Graph, NodeRef, Operation, Owner, Time, Transaction, Value};
+use proptest::prelude::*;
+
+/// One or two operations that belong together; nodes by number.
+#[derive(Debug, Clone)]
+enum Act {
+    Create(usize, usize),
+    Delete(usize),
+    Retype(usize, usize),
+    /// Goes and comes again under its old id.
+    Replace(usize, usize),
+    Link(usize, usize, usize),
+    Unlink(usize, usize, usize),
+    /// Goes and comes again without its attributes.
+    Relink(usize, usize, usize),
+    Set(usize, usize, Option<i64>),
+    SetOnLink((usize, usize, usize), usize, Option<i64>),
+}
+
+fn act() -> impl Strategy<Value = Act> {
+    let node = || 0..7_usize;
+    let link = || (node(), 0..2_usize, node());
+    let value = || prop::option::weighted(0.8, -2..5_i64);
+    prop_oneof![
+        2 => (node(), 0..6_usize).prop_map(|(node, kind)| Act::Create(node, kind)),
+        1 => node().prop_map(Act::Delete),
+        1 => (node(), 0..6_usize).prop_map(|(node, kind)| Act::Retype(node, kind)),
+        1 => (node(), 0..6_usize).prop_map(|(node, kind)| Act::Replace(node, kind)),
+        5 => link().prop_map(|(a, label, b)| Act::Link(a, label, b)),
+        3 => link().prop_map(|(a, label, b)| Act::Unlink(a, label, b)),
+        1 => link().prop_map(|(a, label, b)| Act::Relink(a, label, b)),
+        3 => (node(), 0..2_usize, value()).prop_map(|(node, what, value)| Act::Set(node, what, value)),
+        2 => (link(), 0..2_usize, value())
+            .prop_map(|(link, what, value)| Act::SetOnLink(link, what, value)),
+    ]
+}
+
+fn operations(act: &Act, snapshot: &Snapshot) -> Vec<Operation> {
+    let name = |number: usize| format!("node{number}");
+    let at = |number: usize| NodeRef::Name(name(number));
+    let edge = |a: usize, label: usize, b: usize| EdgeRef::new(at(a), ["on", "by"][label], at(b));
+    let kind = |index: usize| NODE_TYPES[index].to_owned();
+    let create = |id, node, index| Operation::CreateNode {
+        id,
+        type_name: kind(index),
+        name: name(node),
+        attributes: vec![],
+    };
+    let assign = |owner, what: usize, value: Option<i64>| {
+        let name = ["n", "m"][what].to_owned();
+        match value {
+            Some(value) => Operation::SetAttribute {
+                owner,
+                name,
+                value: Value::I64(value),
+            },
+            None => Operation::RemoveAttribute { owner, name },
+        }
+    };
+    match *act {
+        Act::Create(node, index) => vec![create(None, node, index)],
+        Act::Delete(node) => vec![Operation::DeleteNode { node: at(node) }],
+        Act::Retype(node, index) => vec![Operation::RetypeNode {
+            node: at(node),
+            type_name: kind(index),
+        }],
+        Act::Replace(node, index) => {
+            let old = snapshot.find_node_by_name(&name(node)).unwrap();
+            let id = old.map(|old| old.id());
+            vec![
+                Operation::DeleteNode { node: at(node) },
+                create(id, node, index),
+            ]
+        }
+        Act::Link(a, label, b) => vec![Operation::CreateEdge {
+            edge: edge(a, label, b),
+            attributes: vec![],
+        }],
+        Act::Unlink(a, label, b) => vec![Operation::DeleteEdge {
+            edge: edge(a, label, b),
+        }],
+        Act::Relink(a, label, b) => vec![
+            Operation::DeleteEdge {
+                edge: edge(a, label, b),
+            },
+            Operation::CreateEdge {
+                edge: edge(a, label, b),
+                attributes: vec![],
+            },
+        ],
+        Act::Set(node, what, value) => vec![assign(Owner::Node(at(node)), what, value)],
+        Act::SetOnLink((a, label, b), what, value) => {
+            vec![assign(Owner::Edge(edge(a, label, b)), what, value)]
+        }
+    }
+}
+
+/// Commits as many of the acts, from the first on, as the graph allows together.
+fn commit(graph: &mut Graph, acts: &[Act]) -> Option<Change> {
+    let snapshot = graph.snapshot();
+    let all: Vec<Vec<Operation>> = acts.iter().map(|act| operations(act, &snapshot)).collect();
+    (1..=all.len()).rev().find_map(|count| {
+        let transaction = Transaction {
+            preconditions: vec![],
+            operations: all[..count].concat(),
+        };
+        let committed = graph.commit(&transaction, "test", Time::default());
+        committed.ok().map(|(_, change)| change)
+    })
+}
+
+fn fresh(grammar: &Grammar, rule: &str, snapshot: &Snapshot) -> BTreeSet<Binding> {
+    let rule = grammar.rule(rule).unwrap();
+    let matches = grammar.matches(snapshot, rule, &Binding::new()).unwrap();
+    matches.map(Result::unwrap).collect()
+}
+
+fn of_rule(matches: &[RuleMatch], rule: &str) -> BTreeSet<Binding> {
+    let of_rule = matches.iter().filter(|found| found.rule == *rule);
+    of_rule.map(|found| found.binding.clone()).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(600))]
+
+    #[test]
+    fn a_watch_has_what_a_fresh_search_finds(
+        model in Model::strategy(),
+        rules in prop::collection::vec(FEW.rule(), 1..4),
+        groups in prop::collection::vec(prop::collection::vec(act(), 1..4), 1..12),
+    ) {
+        let (mut grammar, _) = parse_grammar(TYPES, "types.aggl");
+        for (index, rule) in rules.into_iter().enumerate() {
+            let mut rule = repaired(rule);
+            rule.name = format!("r{index}").as_str().into();
+            grammar.rules.push(rule);
+        }
+        let (grammar, diagnostics) = parse_grammar(&grammar.to_string(), "random.aggl");
+        prop_assert!(!has_errors(&diagnostics));
+        let grammar = Arc::new(grammar);
+        let names: Vec<&str> = grammar.rules.iter().map(|rule| rule.name.as_str()).collect();
+        let mut graph = model.to_graph();
+        let mut watch = Watch::new(Arc::clone(&grammar), &names, &graph.snapshot()).unwrap();
+        for acts in &groups {
+            let before: Vec<BTreeSet<Binding>> =
+                names.iter().map(|name| watch.matches(name).collect()).collect();
+            let Some(change) = commit(&mut graph, acts) else { continue };
+            let snapshot = graph.snapshot();
+            let delta = watch.update(&change, &snapshot).unwrap();
+            prop_assert_eq!(watch.version(), snapshot.version());
+            for (name, before) in names.iter().zip(before) {
+                let expected = fresh(&grammar, name, &snapshot);
+                let now: Vec<Binding> = watch.matches(name).collect();
+                prop_assert_eq!(now.len(), watch.count(name));
+                let now: BTreeSet<Binding> = now.into_iter().collect();
+                prop_assert_eq!(&now, &expected, "{} after {:?}", grammar.rule(name).unwrap(), change);
+                let added: BTreeSet<Binding> = now.difference(&before).cloned().collect();
+                let removed: BTreeSet<Binding> = before.difference(&now).cloned().collect();
+                prop_assert_eq!(of_rule(&delta.added, name), added);
+                prop_assert_eq!(of_rule(&delta.removed, name), removed);
+            }
+        }
+    }
+}
+
+fn link(graph: &mut Graph, from: &str, label: &str, to: &str) -> Change {
+    let mut transaction = Transaction::new();
+    transaction.create_edge(from, label, to);
+    graph
+        .commit(&transaction, "test", Time::default())
+        .unwrap()
+        .1
+}
+
+#[test]
+fn a_missed_change_is_made_up_for_and_a_late_one_ignored() {
+    let grammar = Arc::new(rule("{ a:box b:box a->b(on) } => { a:box b:box }"));
+    let mut world = graph(
+        &[("box", "x"), ("box", "y"), ("box", "z")],
+        &[("z", "on", "x")],
+    );
+    let mut watch = Watch::new(grammar, &["r"], &world.snapshot()).unwrap();
+    let first = link(&mut world, "x", "on", "y");
+    let between = world.snapshot();
+    let second = link(&mut world, "y", "on", "z");
+    let early = watch.update(&second, &between).unwrap();
+    assert_eq!((early, watch.count("r")), (MatchDelta::default(), 1));
+    let delta = watch.update(&second, &world.snapshot()).unwrap();
+    assert_eq!((delta.added.len(), watch.count("r")), (2, 3));
+    let late = watch.update(&first, &world.snapshot()).unwrap();
+    assert_eq!((late, watch.count("r")), (MatchDelta::default(), 3));
+}
+
+#[test]
+fn rules_that_differ_in_names_only_share_their_matches() {
+    let grammar = Arc::new(read(
+        "name=test\n===\n\
+         up : active(1) { { a:box b:box a->b(on) } => { a:box b:box } }\n\
+         down : active(1) { { c:box d:box c->d(on) } => { c:box d:box d->c(on) } }\n\
+         aside : active(1) { { c:box d:box c->d(by) } => { c:box d:box } }\n",
+    ));
+    let mut world = graph(
+        &[("box", "x"), ("box", "y"), ("box", "z")],
+        &[("z", "on", "x")],
+    );
+    let mut watch = Watch::new(grammar, &["up", "down", "aside"], &world.snapshot()).unwrap();
+    assert_eq!(watch.patterns.len(), 2);
+    let change = link(&mut world, "x", "on", "y");
+    let delta = watch.update(&change, &world.snapshot()).unwrap();
+    let told: Vec<String> = delta
+        .added
+        .iter()
+        .map(|found| format!("{} {}", found.rule, found.binding))
+        .collect();
+    assert_eq!(told, ["up a = 1, b = 2", "down c = 1, d = 2"]);
+}
+
+#[test]
+fn a_rule_that_is_not_there_is_told_with_the_right_name() {
+    let grammar = Arc::new(rule("{ a:box } => { a:box }"));
+    let world = graph(&[("box", "x")], &[]);
+    let error = Watch::new(grammar, &["rr"], &world.snapshot()).unwrap_err();
+    assert_eq!(error.to_string(), "no rule `rr`, did you mean `r`?");
+}

@@ -1,0 +1,120 @@
+//! `cortex rules explain`: in which order a rule's nodes are looked for, and what that comes to.
+
+use super::{find_rule, load};
+use crate::commands::graph::read_graph;
+use crate::commands::output::{print, print_json};
+use crate::{Answer, Failure};
+use grammar::{Binding, Rule, SearchPlan, SearchStep};
+use serde_json::{Value as Json, json};
+use std::fmt::Write as _;
+use std::path::Path;
+
+pub(super) fn explain(
+    file: &Path,
+    rule: Option<&str>,
+    world: Option<&Path>,
+    as_json: bool,
+) -> Result<Answer, Failure> {
+    let grammar = load(file)?;
+    let rules: Vec<&Rule> = match rule {
+        Some(name) => vec![find_rule(&grammar, name)?],
+        None => grammar.rules.iter().collect(),
+    };
+    let graph = world.map(read_graph).transpose()?;
+    let snapshot = graph.as_ref().map(dsr::Graph::snapshot);
+    let plans = rules
+        .iter()
+        .map(|rule| grammar.search_plan(snapshot.as_ref(), rule, &Binding::new()))
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(Failure::internal)?;
+    if as_json {
+        let mut rows: Vec<Json> = plans.iter().map(plan_json).collect();
+        // Asked for one rule, the answer is of one rule.
+        let one = rule.is_some().then(|| rows.pop()).flatten();
+        print_json(&one.unwrap_or(Json::Array(rows)))?;
+        return Ok(Answer::Yes);
+    }
+    let tables: Vec<String> = plans.iter().map(table).collect();
+    print(&tables.join("\n"))?;
+    Ok(Answer::Yes)
+}
+
+fn plan_json(plan: &SearchPlan) -> Json {
+    let step = |step: &SearchStep| {
+        json!({
+            "binds": step.binds,
+            "source": step.source,
+            "checks": step.checks,
+            "expected": {"candidates": step.candidates, "passing": step.passing},
+            "found": step.found.map(|[candidates, passing]| {
+                json!({"candidates": candidates, "passing": passing})
+            }),
+        })
+    };
+    json!({
+        "rule": plan.rule,
+        "cost": plan.cost,
+        "counted": plan.counted,
+        "checks": plan.checks,
+        "steps": plan.steps.iter().map(step).collect::<Vec<_>>(),
+    })
+}
+
+/// Small numbers need digits, large ones only their size.
+fn about(number: f64) -> String {
+    if number < 10.0 {
+        format!("{number:.1}")
+    } else {
+        format!("{number:.0}")
+    }
+}
+
+fn table(plan: &SearchPlan) -> String {
+    let counts = if plan.counted {
+        "by the graph's counts"
+    } else {
+        "by assumed counts: no world was given"
+    };
+    let mut text = format!("{}, {counts}: cost {}\n", plan.rule, about(plan.cost));
+    let mut rows = vec![[
+        "binds".to_owned(),
+        "from".to_owned(),
+        "candidates".to_owned(),
+        "passing".to_owned(),
+        "if".to_owned(),
+    ]];
+    if !plan.checks.is_empty() {
+        let [none, dash] = [String::new(), "-".to_owned()];
+        let checks = plan.checks.join(" ");
+        rows.push([none.clone(), dash, none.clone(), none, checks]);
+    }
+    for step in &plan.steps {
+        let cell = |expected: f64, found: Option<u64>| match found {
+            Some(found) => format!("{} ({found})", about(expected)),
+            None => about(expected),
+        };
+        rows.push([
+            step.binds.join(" "),
+            step.source.clone(),
+            cell(step.candidates, step.found.map(|found| found[0])),
+            cell(step.passing, step.found.map(|found| found[1])),
+            step.checks.join(" "),
+        ]);
+    }
+    let mut widths = [0; 5];
+    for row in &rows {
+        for (width, cell) in widths.iter_mut().zip(row) {
+            *width = (*width).max(cell.chars().count());
+        }
+    }
+    for row in &rows {
+        let cells: Vec<String> = row
+            .iter()
+            .zip(widths)
+            .map(|(cell, width)| format!("{cell:width$}"))
+            .collect();
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "    {}", cells.join("  ").trim_end());
+    }
+    text
+}
