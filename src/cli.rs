@@ -82,6 +82,12 @@ pub(crate) struct Run {
     /// Recorded pedestrians instead of the scenario's people
     #[arg(long, value_name = "FILE")]
     pub(crate) tracks: Option<PathBuf>,
+    /// Keep the graph in this folder, and go on from what an earlier run left there
+    #[arg(long, value_name = "DIR")]
+    pub(crate) state: Option<PathBuf>,
+    /// Acknowledge every commit only once it is on disk
+    #[arg(long, requires = "state")]
+    pub(crate) durable: bool,
     /// Folder for report.json, the map and the logs [default: reports/SCENARIO]
     #[arg(long, value_name = "DIR")]
     pub(crate) report: Option<PathBuf>,
@@ -132,6 +138,12 @@ pub(crate) struct Store {
     /// Folder of the scenario that the graph starts from
     #[arg(long, value_name = "DIR")]
     pub(crate) scenario: PathBuf,
+    /// Keep the graph in this folder, and go on from what an earlier store left there
+    #[arg(long, value_name = "DIR")]
+    pub(crate) state: Option<PathBuf>,
+    /// Acknowledge every commit only once it is on disk
+    #[arg(long, requires = "state")]
+    pub(crate) durable: bool,
     /// Start from a graph that a supervisor saved, instead of the scenario's
     #[arg(long, value_name = "FILE")]
     pub(crate) restore: Option<PathBuf>,

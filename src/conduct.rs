@@ -4,7 +4,7 @@
 
 use crate::progress::Progress;
 use crate::supervise::{Hold, Notice, Policy, Program, SuperviseError, Supervisor};
-use dsr::{Image, Instance, ReadError, Session, Snapshot, Subscriber, Tick, Value};
+use dsr::{Image, Instance, ReadError, Session, Snapshot, Subscriber, Tick, Time, Value};
 use scenarios::process::{TICK, TRUTH, tick_time};
 use scenarios::{Scenario, Truth};
 use std::ffi::OsString;
@@ -28,6 +28,8 @@ pub(crate) struct Settings<'a> {
     pub(crate) speed: f64,
     pub(crate) lockstep: bool,
     pub(crate) tracks: Option<&'a Path>,
+    /// Where the graph is kept, and whether every commit waits for it.
+    pub(crate) state: Option<(&'a Path, bool)>,
     pub(crate) logs: PathBuf,
 }
 
@@ -99,6 +101,8 @@ struct Conductor<'a> {
     store: usize,
     agents: Vec<usize>,
     world: usize,
+    /// When the world's time begins: the scenario's start, or later where a state goes on.
+    start: Time,
     recording: Recording,
     /// Samples of the world that did not arrive.
     lost: u64,
@@ -169,6 +173,7 @@ impl<'a> Conductor<'a> {
             store: 0,
             agents: Vec::new(),
             world: 0,
+            start: settings.scenario.start,
             recording: Recording::default(),
             lost: 0,
             interrupted,
@@ -178,6 +183,7 @@ impl<'a> Conductor<'a> {
         conductor.store = conductor.supervisor.start(conductor.store_program())?;
         conductor.until_ready(conductor.store)?;
         conductor.session.wait_for_store(PATIENCE)?;
+        conductor.start = conductor.start.max(conductor.session.snapshot()?.time());
         conductor.progress.say("starting the agents");
         for name in crate::commands::AGENTS {
             let program = conductor.agent_program(name, Policy::Restart);
@@ -200,6 +206,12 @@ impl<'a> Conductor<'a> {
         arguments.extend(["--instance".into(), settings.instance.name().into()]);
         if !settings.social {
             arguments.push("--no-social".into());
+        }
+        if let Some((folder, durable)) = settings.state {
+            arguments.extend(["--state".into(), folder.into()]);
+            if durable {
+                arguments.push("--durable".into());
+            }
         }
         Program {
             name: "store".to_owned(),
@@ -253,7 +265,7 @@ impl<'a> Conductor<'a> {
     fn in_lockstep(&mut self) -> Result<bool, ConductError> {
         let mut order = vec![self.world];
         order.extend(&self.agents);
-        let start = self.settings.scenario.start;
+        let start = self.start;
         let ticks = (self.settings.scenario.duration / TICK).ceil() as u64;
         let interrupted = self.interrupted;
         for index in 1..=ticks {
@@ -307,7 +319,7 @@ impl<'a> Conductor<'a> {
             }
             let over = self.missions_are_over(round.is_multiple_of(10))?;
             let last = self.recording.truths.last().map(|truth| truth.time);
-            let start = self.settings.scenario.start;
+            let start = self.start;
             let late = last.is_some_and(|t| t.since(start) >= self.settings.scenario.duration);
             if over || late {
                 return Ok(true);
@@ -335,7 +347,7 @@ impl<'a> Conductor<'a> {
             other => other?,
         };
         if show {
-            let start = self.settings.scenario.start;
+            let start = self.start;
             let now = self
                 .recording
                 .truths

@@ -21,6 +21,7 @@ mod schema;
 )]
 mod shm;
 mod snapshot;
+mod state;
 mod time;
 mod transaction;
 mod value;
@@ -41,8 +42,9 @@ pub use snapshot::{
     Attribute, Edge, Edges, Element, Neighbors, Node, NodeIds, Snapshot, TransformError,
     TripleCount, ValueRange,
 };
+pub use state::{State, StateError};
 pub use time::Time;
 pub use transaction::{
-    Commit, EdgeRef, NodeRef, Operation, Owner, Precondition, Refusal, Transaction,
+    Commit, Durability, EdgeRef, NodeRef, Operation, Owner, Precondition, Refusal, Transaction,
 };
 pub use value::{Pose, Value, ValueKind, planar_pose, pose_on_floor};

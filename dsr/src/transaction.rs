@@ -185,6 +185,19 @@ pub enum Precondition {
     },
 }
 
+/// When the store acknowledges a commit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Durability {
+    /// As the store was told to do by default.
+    #[default]
+    AsTheStore,
+    /// Once everybody can see it. It reaches the disk with the next group of commits, if the
+    /// store keeps a state folder.
+    InMemory,
+    /// Once it is on disk, so that it outlives every process and the machine's power.
+    OnDisk,
+}
+
 /// A list of operations that the store applies whole or not at all.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Transaction {
@@ -192,6 +205,8 @@ pub struct Transaction {
     pub preconditions: Vec<Precondition>,
     /// What to do, in this order.
     pub operations: Vec<Operation>,
+    /// When to acknowledge it.
+    pub durability: Durability,
 }
 
 impl Transaction {
@@ -209,6 +224,13 @@ impl Transaction {
     #[must_use]
     pub fn require(mut self, precondition: Precondition) -> Self {
         self.preconditions.push(precondition);
+        self
+    }
+
+    /// Asks for an acknowledgement only once the commit is on disk.
+    #[must_use]
+    pub fn durable(mut self) -> Self {
+        self.durability = Durability::OnDisk;
         self
     }
 
@@ -283,6 +305,8 @@ pub struct Commit {
     pub time: Time,
     /// The ids of the nodes that it created, in the order of its operations.
     pub created: Vec<NodeId>,
+    /// Whether it is known to be on disk.
+    pub durable: bool,
 }
 
 /// The store's no: nothing was changed.
@@ -317,6 +341,9 @@ pub enum Refusal {
         /// Bytes in use.
         bytes: u64,
     },
+    /// A durable acknowledgement was asked for, and the store keeps nothing on disk.
+    #[error("the commit cannot be made durable: {0}")]
+    NotDurable(String),
     /// The request could not be read.
     #[error("malformed request: {0}")]
     Malformed(String),

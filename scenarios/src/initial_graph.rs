@@ -29,6 +29,7 @@ pub fn initial_graph(scenario: &Scenario) -> Transaction {
         attribute("walls", Value::F64List(walls)),
         attribute("bounds", scenario.bounds),
         attribute("social", true),
+        attribute("scenario", scenario.name.as_str()),
     ];
     graph.create_node("world", WORLD, world);
     for room in &scenario.rooms {

@@ -12,11 +12,13 @@ pub mod metrics;
 pub mod picture;
 pub mod process;
 pub mod report;
+mod resume;
 pub mod scenario;
 pub mod tracks;
 pub mod world;
 
 pub use initial_graph::{WORLD, initial_graph, schema};
+pub use resume::{ResumeError, resume};
 pub use scenario::{LoadError, Scenario};
 pub use tracks::{Tracks, TracksError};
 pub use world::{Inputs, Outputs, Truth, World};

@@ -68,13 +68,16 @@ fn take_part(arguments: &Arguments, instance: &Instance, pace: Pace) -> Result<(
     // Input is read before anything is joined, so that what is wrong with it is told at once.
     match name {
         "world" => {
-            let scenario = scenario()?;
+            let mut scenario = scenario()?;
             let tracks = arguments.tracks.as_deref().map(Tracks::load).transpose();
             let tracks = tracks.map_err(|error| Failure::Input(error.into()))?;
-            let world = World::new(&scenario, arguments.seed, tracks);
-            let Some(session) = attach()? else {
+            let Some(mut session) = attach()? else {
                 return Ok(());
             };
+            // A graph that an earlier run left is further on, and time does not run back.
+            let saved = session.snapshot().map_err(Failure::internal)?.time();
+            scenario.start = scenario.start.max(saved);
+            let world = World::new(&scenario, arguments.seed, tracks);
             scenarios::process::run(session, begin, world, arguments.speed)
                 .map_err(Failure::internal)
         }

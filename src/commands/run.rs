@@ -29,10 +29,13 @@ struct Plan<'a> {
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     // Everything that can be wrong with the input is told before a process is started.
     let scenario = super::load_scenario(&arguments.scenario)?;
-    let (_, grammar) = super::load_rules(&scenario)?;
+    let (schema, grammar) = super::load_rules(&scenario)?;
     super::check_goals(&scenario, &grammar)?;
     if let Some(tracks) = &arguments.tracks {
         Tracks::load(tracks).map_err(|error| Failure::Input(error.into()))?;
+    }
+    if let Some(folder) = &arguments.state {
+        super::store::check_state(folder, &scenario, schema)?;
     }
     let spaces = object_spaces(&scenario, &SocialConfig::default()).map_err(Failure::input)?;
     let folder = arguments
@@ -92,6 +95,12 @@ impl Plan<'_> {
             speed: arguments.speed,
             lockstep: arguments.lockstep || baseline,
             tracks: arguments.tracks.as_deref(),
+            // What is remembered is of the run that counts.
+            state: arguments
+                .state
+                .as_deref()
+                .filter(|_| !baseline)
+                .map(|folder| (folder, arguments.durable)),
             logs,
         };
         let mut progress = Progress::new(&title, arguments.json);

@@ -2,12 +2,16 @@
 
 use crate::cli::Store as Arguments;
 use crate::{Answer, Failure};
-use dsr::{Image, Instance, Pace, Store, Turns};
+use dsr::{Durability, Graph, Image, Instance, Pace, Schema, State, Store, Turns};
+use scenarios::Scenario;
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
 /// How often the store looks after the dead, in rounds of serving.
 const CLEANING: u32 = 40;
+/// How far groups of commits that nobody waits for are apart on their way to the disk.
+const SYNC_INTERVAL: Duration = Duration::from_millis(100);
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     let instance = super::instance(&arguments.instance.instance)?;
@@ -28,22 +32,18 @@ fn serve(arguments: &Arguments, instance: &Instance, pace: Pace) -> Result<(), F
     let scenario = super::load_scenario(&arguments.scenario)?;
     let (schema, grammar) = super::load_rules(&scenario)?;
     let interrupted = super::interruption()?;
+    let state = arguments.state.as_deref().map(open_state).transpose()?;
     let mut store = Store::open(instance, schema).map_err(Failure::internal)?;
     store.graph_mut().set_rules(Arc::new(grammar));
-    match &arguments.restore {
-        Some(path) => {
-            let bytes = std::fs::read(path).map_err(Failure::input)?;
-            let image: Image = dsr::decode_image(&bytes).map_err(Failure::input)?;
-            store.restore(&image).map_err(Failure::internal)?;
-            tracing::info!("restored version {}", image.version());
-        }
-        None => {
-            let mut initial = scenarios::initial_graph(&scenario);
-            initial.set(scenarios::WORLD, "social", !arguments.no_social);
-            store
-                .commit(&initial, scenario.start)
-                .map_err(Failure::internal)?;
-        }
+    begin(&mut store, arguments, &scenario, state.as_ref())?;
+    if let Some(state) = state {
+        let durability = if arguments.durable {
+            Durability::OnDisk
+        } else {
+            Durability::InMemory
+        };
+        let kept = store.keep(state, SYNC_INTERVAL, durability);
+        kept.map_err(Failure::internal)?;
     }
     let mut lifeline = Turns::begin(pace, interrupted).map_err(Failure::internal)?;
     let mut round = 0u32;
@@ -56,5 +56,56 @@ fn serve(arguments: &Arguments, instance: &Instance, pace: Pace) -> Result<(), F
             store.clean_up_after_the_dead();
         }
     }
+    Ok(())
+}
+
+/// Opens a state folder that the user named.
+pub(super) fn open_state(folder: &Path) -> Result<State, Failure> {
+    State::open(folder).map_err(Failure::input)
+}
+
+/// Whether a run of the scenario can go on from the folder: for who wants to know it before there is
+/// a store.
+pub(super) fn check_state(
+    folder: &Path,
+    scenario: &Scenario,
+    schema: Schema,
+) -> Result<(), Failure> {
+    if let Some(image) = open_state(folder)?.load().map_err(Failure::input)? {
+        let mut graph = Graph::in_memory(schema);
+        graph.restore(&image).map_err(Failure::input)?;
+        scenarios::resume(scenario, &graph.snapshot()).map_err(Failure::input)?;
+    }
+    Ok(())
+}
+
+/// Fills the empty graph: with what a supervisor saved of the store before this one, else with what
+/// is on disk, brought in line with the scenario, else with the scenario's.
+fn begin(
+    store: &mut Store,
+    arguments: &Arguments,
+    scenario: &Scenario,
+    state: Option<&State>,
+) -> Result<(), Failure> {
+    if let Some(path) = &arguments.restore {
+        let bytes = std::fs::read(path).map_err(Failure::input)?;
+        let image: Image = dsr::decode_image(&bytes).map_err(Failure::input)?;
+        store.restore(&image).map_err(Failure::internal)?;
+        tracing::info!("restored version {}", image.version());
+        return Ok(());
+    }
+    let saved = state.map(State::load).transpose().map_err(Failure::input)?;
+    let mut first = match saved.flatten() {
+        Some(image) => {
+            store.restore(&image).map_err(Failure::input)?;
+            tracing::info!("version {} goes on from disk", image.version());
+            let snapshot = store.graph_mut().snapshot();
+            scenarios::resume(scenario, &snapshot).map_err(Failure::input)?
+        }
+        None => scenarios::initial_graph(scenario),
+    };
+    first.set(scenarios::WORLD, "social", !arguments.no_social);
+    let committed = store.commit(&first, scenario.start);
+    committed.map_err(Failure::internal)?;
     Ok(())
 }

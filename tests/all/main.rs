@@ -16,5 +16,6 @@ mod path;
 mod plan;
 mod rules;
 mod run;
+mod state;
 mod support;
 mod tree;

@@ -6,9 +6,13 @@
     reason = "standard output is how it speaks to the test"
 )]
 
-use dsr::{Instance, ReadError, Schema, Session, Snapshot, Store, Time, Transaction, Value};
+use dsr::{
+    Durability, Instance, ReadError, Schema, Session, Snapshot, State, Store, Time, Transaction,
+    Value,
+};
 use std::error::Error;
 use std::io::Read;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -27,6 +31,8 @@ fn main() -> Outcome {
     match role.as_str() {
         "store" => store(&instance),
         "join" => join(&instance),
+        "store-with-state" => store_with_state(&instance, rest),
+        "write-durable" => write_durable(&instance, number(0)?),
         "write-pairs" => write_pairs(&instance),
         "read-pairs" => read_pairs(&instance),
         "memory" => memory(&instance, number(0)?),
@@ -76,6 +82,63 @@ fn join(instance: &Instance) -> Outcome {
     }
     drop((sender, receiver));
     Ok(())
+}
+
+/// A store that keeps its graph in a folder, with a new group every few milliseconds.
+fn store_with_state(instance: &Instance, rest: &[String]) -> Outcome {
+    let folder = rest.first().ok_or("which folder?")?;
+    let state = State::open(Path::new(folder))?;
+    let mut store = Store::open(instance, Schema::open())?;
+    if let Some(image) = state.load()? {
+        store.restore(&image)?;
+    }
+    store.keep(state, Duration::from_millis(3), Durability::InMemory)?;
+    println!("ready");
+    let ended = end_of_input();
+    while !ended.load(Ordering::Acquire) {
+        store.serve(Duration::from_millis(20))?;
+    }
+    Ok(())
+}
+
+/// Writes ever greater numbers to nodes of its own, all in one transaction, flat out, and says
+/// each number that the store called durable, with the version.
+fn write_durable(instance: &Instance, client: u64) -> Outcome {
+    let mut session = Session::attach(instance, &format!("writer{client}"), PATIENCE)?;
+    let name = |i: u64| format!("w{client}-{i}");
+    let snapshot = session.snapshot()?;
+    let mut n = match snapshot.find_node_by_name(&name(0))? {
+        Some(node) => node.value("n")?.and_then(|n| n.as_f64()).unwrap_or(0.0) as u64,
+        None => {
+            let mut create = Transaction::new();
+            for i in 0..PAIRS {
+                create.create_node("pair", &name(i), vec![("n".into(), Value::U64(0))]);
+            }
+            session.commit(&create, Time::default())?;
+            0
+        }
+    };
+    loop {
+        n += 1;
+        let mut transaction = Transaction::new();
+        for i in 0..PAIRS {
+            transaction.set(name(i), "n", Value::U64(n));
+        }
+        // A node that comes and goes, with edges.
+        let visitor = format!("visitor{client}");
+        if n.is_multiple_of(2) {
+            transaction.create_node("visitor", &visitor, vec![]);
+            transaction.create_edge(visitor, "sees", name(n % PAIRS));
+        } else if session.snapshot()?.find_node_by_name(&visitor)?.is_some() {
+            transaction.delete_node(visitor);
+        }
+        if n.is_multiple_of(3) {
+            let commit = session.commit(&transaction.durable(), Time::default())?;
+            println!("{n} {}", commit.version);
+        } else {
+            session.commit(&transaction, Time::default())?;
+        }
+    }
 }
 
 /// How many nodes every transaction of `write-pairs` writes the same number to.

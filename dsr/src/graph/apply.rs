@@ -117,40 +117,40 @@ impl<'a> Work<'a> {
 
     /// The root of a graph that is what the image says.
     pub(super) fn restore(graph: &'a mut Graph, image: &Image) -> Result<Root, Refusal> {
-        let (nodes, edges, writers) = image.parts();
-        let (version, time, next_id) = image.stamp();
-        let mut work = Self::new(graph, "store", time)?;
-        for node in nodes {
-            let type_name = work.schema().type_name(node.type_id).to_owned();
+        let (frame, names) = (&image.frame, &image.schema);
+        let mut work = Self::new(graph, "store", frame.time)?;
+        for node in &image.nodes {
+            let type_name = names.type_name(node.type_id);
             work.stamp.record = node.version;
-            work.create_node(Some(node.id), &type_name, &node.name, &[])?;
-            work.restore_attributes(&Owner::Node(node.id.into()), &node.attributes)?;
+            work.create_node(Some(node.id), type_name, &node.name, &[])?;
+            work.restore_attributes(names, &Owner::Node(node.id.into()), &node.attributes)?;
         }
-        for edge in edges {
-            let label = work.schema().label_name(edge.key.label).to_owned();
+        for edge in &image.edges {
             let key = EdgeRef {
                 from: edge.key.from.into(),
-                label,
+                label: names.label_name(edge.key.label).to_owned(),
                 to: edge.key.to.into(),
             };
             work.stamp.record = edge.version;
             work.create_edge(&key, &[])?;
-            work.restore_attributes(&Owner::Edge(key), &edge.attributes)?;
+            work.restore_attributes(names, &Owner::Edge(key), &edge.attributes)?;
         }
         let schema = work.graph.write_schema(&mut work.root);
         work.room(schema)?;
-        let writers = work.graph.write_writers(writers.to_vec(), &mut work.root);
+        let writers = frame.writers.clone();
+        let writers = work.graph.write_writers(writers, &mut work.root);
         work.room(writers)?;
-        work.root.version = version.0;
-        work.root.time = time.nanoseconds();
+        work.root.version = frame.version.0;
+        work.root.time = frame.time.nanoseconds();
         // The image does not say who made its version.
         work.root.agent = 0;
-        work.root.next_id = next_id.max(work.root.next_id);
+        work.root.next_id = frame.next_id.max(work.root.next_id);
         Ok(work.root)
     }
 
     fn restore_attributes(
         &mut self,
+        names: &Schema,
         owner: &Owner,
         rows: &[AttributeImage],
     ) -> Result<(), Refusal> {
@@ -161,8 +161,8 @@ impl<'a> Work<'a> {
                 time: row.time,
                 writer: row.writer,
             };
-            let name = self.schema().attribute_name(row.name).to_owned();
-            self.change_attribute(owner, &name, Some(&row.value))?;
+            let name = names.attribute_name(row.name);
+            self.change_attribute(owner, name, Some(&row.value))?;
         }
         Ok(())
     }

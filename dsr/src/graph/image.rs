@@ -4,15 +4,15 @@
 
 use super::{Graph, apply};
 use crate::{
-    AttributeId, EdgeKey, NodeId, ReadError, Refusal, Schema, Snapshot, Time, TypeId, Value,
-    Version,
+    Attribute, AttributeId, Edge, EdgeKey, Node, NodeId, ReadError, Refusal, Schema, Snapshot,
+    Time, TypeId, Value, Version,
 };
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// A value of an attribute; older values of its history come before it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct AttributeImage {
+pub(crate) struct AttributeImage {
     pub(super) name: AttributeId,
     pub(super) value: Value,
     pub(super) version: u64,
@@ -21,8 +21,8 @@ pub(super) struct AttributeImage {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct NodeImage {
-    pub(super) id: NodeId,
+pub(crate) struct NodeImage {
+    pub(crate) id: NodeId,
     pub(super) type_id: TypeId,
     pub(super) name: String,
     pub(super) version: u64,
@@ -30,22 +30,75 @@ pub(super) struct NodeImage {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct EdgeImage {
-    pub(super) key: EdgeKey,
+pub(crate) struct EdgeImage {
+    pub(crate) key: EdgeKey,
     pub(super) version: u64,
     pub(super) attributes: Vec<AttributeImage>,
+}
+
+impl AttributeImage {
+    fn of(attribute: Attribute) -> Self {
+        Self {
+            name: attribute.name,
+            value: attribute.value,
+            version: attribute.version.0,
+            time: attribute.time.nanoseconds(),
+            writer: attribute.writer.0,
+        }
+    }
+}
+
+impl NodeImage {
+    pub(crate) fn of(node: &Node<'_>) -> Result<Self, ReadError> {
+        let attributes = node.recorded()?;
+        Ok(Self {
+            id: node.id(),
+            type_id: node.type_id(),
+            name: node.name()?,
+            version: node.version()?.0,
+            attributes: attributes.into_iter().map(AttributeImage::of).collect(),
+        })
+    }
+}
+
+impl EdgeImage {
+    pub(crate) fn of(edge: &Edge<'_>) -> Result<Self, ReadError> {
+        let attributes = edge.recorded()?;
+        Ok(Self {
+            key: edge.key(),
+            version: edge.version()?.0,
+            attributes: attributes.into_iter().map(AttributeImage::of).collect(),
+        })
+    }
+}
+
+/// What an image says beside its nodes and edges.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Frame {
+    pub(crate) writers: Vec<String>,
+    pub(crate) version: Version,
+    pub(crate) time: Time,
+    pub(crate) next_id: u64,
+}
+
+impl Frame {
+    pub(crate) fn of(snapshot: &Snapshot) -> Result<Self, ReadError> {
+        Ok(Self {
+            writers: snapshot.writers()?,
+            version: snapshot.version(),
+            time: snapshot.time(),
+            next_id: snapshot.root.next_id,
+        })
+    }
 }
 
 /// A whole version of the graph.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Image {
-    schema: Schema,
-    writers: Vec<String>,
-    version: Version,
-    time: Time,
-    next_id: u64,
-    nodes: Vec<NodeImage>,
-    edges: Vec<EdgeImage>,
+    pub(crate) schema: Schema,
+    pub(crate) frame: Frame,
+    pub(crate) nodes: Vec<NodeImage>,
+    pub(crate) edges: Vec<EdgeImage>,
 }
 
 impl Image {
@@ -54,46 +107,23 @@ impl Image {
     /// # Errors
     /// [`ReadError`].
     pub fn of(snapshot: &Snapshot) -> Result<Self, ReadError> {
-        let image = |a: crate::Attribute| AttributeImage {
-            name: a.name,
-            value: a.value,
-            version: a.version.0,
-            time: a.time.nanoseconds(),
-            writer: a.writer.0,
-        };
         let mut nodes = Vec::new();
         let mut edges = Vec::new();
         for node in snapshot.nodes() {
             let node = node?;
-            let attributes = node.recorded()?.into_iter().map(image).collect();
-            let (id, type_id) = (node.id(), node.type_id());
-            nodes.push(NodeImage {
-                id,
-                type_id,
-                name: node.name()?,
-                version: node.version()?.0,
-                attributes,
-            });
+            nodes.push(NodeImage::of(&node)?);
             for key in node.out_edges() {
-                let key = key?;
-                let Some(edge) = snapshot.find_edge(key)? else {
-                    continue;
-                };
-                let attributes = edge.recorded()?.into_iter().map(image).collect();
-                let version = edge.version()?.0;
-                edges.push(EdgeImage {
-                    key,
-                    version,
-                    attributes,
-                });
+                if let Some(edge) = snapshot.find_edge(key?)? {
+                    edges.push(EdgeImage::of(&edge)?);
+                }
             }
         }
+        // The trie gives them in another order.
+        nodes.sort_by_key(|node| node.id);
+        edges.sort_by_key(|edge| edge.key);
         Ok(Self {
             schema: snapshot.schema().clone(),
-            writers: snapshot.writers()?,
-            version: snapshot.version(),
-            time: snapshot.time(),
-            next_id: snapshot.root.next_id,
+            frame: Frame::of(snapshot)?,
             nodes,
             edges,
         })
@@ -107,7 +137,12 @@ impl Image {
 
     /// The version that this is the image of.
     pub fn version(&self) -> Version {
-        self.version
+        self.frame.version
+    }
+
+    /// Its time.
+    pub fn time(&self) -> Time {
+        self.frame.time
     }
 }
 
@@ -122,8 +157,12 @@ pub fn decode_image(bytes: &[u8]) -> Result<Image, Refusal> {
 impl Graph {
     /// Replaces an empty graph's content by an image. Its version becomes the image's.
     ///
+    /// The schema becomes the image's too if the graph's own is open; else the image is read into
+    /// the graph's schema by the names of its types, labels and attributes.
+    ///
     /// # Errors
-    /// [`Refusal::AlreadyExists`] where the graph is not empty; [`Refusal::OutOfMemory`].
+    /// [`Refusal::AlreadyExists`] where the graph is not empty; [`Refusal::SchemaViolation`] where
+    /// its schema does not allow what the image has; [`Refusal::OutOfMemory`].
     pub fn restore(&mut self, image: &Image) -> Result<(), Refusal> {
         if self.snapshot().node_count() > 0 {
             return Err(Refusal::AlreadyExists(
@@ -131,7 +170,9 @@ impl Graph {
             ));
         }
         let before = (Arc::clone(&self.schema), self.writers.clone());
-        self.schema = Arc::new(image.schema.clone());
+        if self.schema.is_open() {
+            self.schema = Arc::new(image.schema.clone());
+        }
         let root = apply::Work::restore(self, image);
         match root {
             Ok(root) => {
@@ -143,15 +184,5 @@ impl Graph {
                 Err(refusal)
             }
         }
-    }
-}
-
-impl Image {
-    pub(super) fn parts(&self) -> (&[NodeImage], &[EdgeImage], &[String]) {
-        (&self.nodes, &self.edges, &self.writers)
-    }
-
-    pub(super) fn stamp(&self) -> (Version, Time, u64) {
-        (self.version, self.time, self.next_id)
     }
 }

@@ -5,6 +5,7 @@
 mod apply;
 mod image;
 
+pub(crate) use image::{EdgeImage, Frame, NodeImage};
 pub use image::{Image, decode_image};
 
 use crate::arena::allocator::{Allocator, Full, Growth, HeapGrowth};
@@ -231,6 +232,7 @@ impl Graph {
                         version: Version(root.version),
                         time,
                         created,
+                        durable: false,
                     },
                     change,
                 ))

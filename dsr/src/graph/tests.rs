@@ -189,7 +189,7 @@ pub(crate) fn value() -> impl Strategy<Value = Value> {
     ]
 }
 
-fn operation() -> impl Strategy<Value = Operation> {
+pub(crate) fn operation() -> impl Strategy<Value = Operation> {
     let node = || (0..60u32).prop_map(|i| format!("n{i}"));
     let kind = || (0..4u32).prop_map(|i| format!("t{i}"));
     let attribute = || (0..6u32).prop_map(|i| format!("a{i}"));
@@ -247,7 +247,7 @@ proptest! {
                     kept.push(operation);
                 }
             }
-            let transaction = Transaction { preconditions: vec![], operations: kept };
+            let transaction = Transaction { operations: kept, ..Transaction::new() };
             let outcome = graph.commit(&transaction, "tester", Time::default());
             prop_assert_eq!(outcome.is_err(), refused, "{:?}", outcome);
             if !refused {
@@ -400,8 +400,8 @@ fn wild_ids_live_beside_small_ones() {
             attributes: vec![],
         };
         let transaction = Transaction {
-            preconditions: vec![],
             operations: vec![create],
+            ..Transaction::new()
         };
         graph.commit(&transaction, "a", Time::default()).unwrap();
     }

@@ -11,7 +11,10 @@ use super::{
 };
 use crate::arena::Arena;
 use crate::arena::record;
-use crate::{Commit, Epoch, Filter, ReadError, Refusal, Schema, Snapshot, Time, Transaction};
+use crate::{
+    Commit, Durability, Epoch, Filter, ReadError, Refusal, Schema, Snapshot, Time, Transaction,
+    Version,
+};
 use iceoryx2::port::client::Client;
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
@@ -102,6 +105,13 @@ pub enum CommitError {
     /// No store answered in time; whether the transaction was applied is in the next snapshot.
     #[error("the store did not answer within {} s", PATIENCE.as_secs())]
     NoAnswer,
+    /// The transaction was applied, and everybody sees it, but the store could not bring it to the
+    /// disk.
+    #[error("version {version} was committed, but could not be written to disk")]
+    NotDurable {
+        /// The version that it made.
+        version: Version,
+    },
     /// The store was restarted meanwhile; whether the transaction was applied is in the next
     /// snapshot.
     #[error("the store was restarted before it answered")]
@@ -341,7 +351,12 @@ impl Session {
                 {
                     let answer: Result<Commit, Refusal> = postcard::from_bytes(answer.payload())
                         .map_err(|e| ipc("the store's answer", e))?;
-                    return Ok(answer?);
+                    let commit = answer?;
+                    if transaction.durability == Durability::OnDisk && !commit.durable {
+                        let version = commit.version;
+                        return Err(CommitError::NotDurable { version });
+                    }
+                    return Ok(commit);
                 }
                 let left = retry.saturating_duration_since(now());
                 if left.is_zero() {

@@ -6,7 +6,11 @@ use super::session::{CHANGES, COMMITS_EVENT, REQUESTS_EVENT, Request, event, req
 use super::{Instance, InstanceError, Ipc, IpcNode, Publisher, ipc, wait};
 use crate::arena::allocator::Full;
 use crate::graph::Image;
-use crate::{Change, Commit, Epoch, Graph, Refusal, Schema, Time, Transaction};
+use crate::state::Keeper;
+use crate::{
+    Change, Commit, Durability, Epoch, Graph, Refusal, Schema, State, StateError, Time, Transaction,
+};
+use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::server::Server;
@@ -27,10 +31,18 @@ pub enum StoreError {
     /// The graph refused what it should start with.
     #[error("the initial graph was refused: {0}")]
     Refused(#[from] Refusal),
+    /// The state folder cannot be used.
+    #[error(transparent)]
+    State(#[from] StateError),
+    /// The operating system gave no thread.
+    #[error("the state cannot be kept: {0}")]
+    Thread(std::io::Error),
 }
 
 /// An answer as it was given.
 type Answer = Result<Commit, Refusal>;
+/// A request that awaits its answer.
+type Asker = ActiveRequest<Ipc, [u8], (), [u8], ()>;
 
 /// The store of an instance: one process holds it, and it alone writes the graph.
 #[derive(Debug)]
@@ -44,6 +56,10 @@ pub struct Store {
     /// The last request of each client, with its answer.
     answered: BTreeMap<u64, (u64, Answer)>,
     last_time: Time,
+    keeper: Option<Keeper>,
+    durability: Durability,
+    /// Who is to be told of a commit once it is on disk.
+    waiting: Vec<(Asker, Commit)>,
     // Dropped last: the ports above belong to it.
     node: IpcNode,
 }
@@ -90,6 +106,9 @@ impl Store {
             changes,
             answered,
             last_time,
+            keeper: None,
+            durability: Durability::InMemory,
+            waiting: Vec::new(),
             node,
         })
     }
@@ -101,6 +120,37 @@ impl Store {
     pub fn restore(&mut self, image: &Image) -> Result<(), StoreError> {
         self.graph.restore(image)?;
         self.last_time = self.graph.snapshot().time();
+        Ok(())
+    }
+
+    /// From now on keeps the graph in a state folder, which first becomes what the graph is now.
+    ///
+    /// A commit that asks for it, or every one where `durability` is [`Durability::OnDisk`] and
+    /// it does not ask for less, is acknowledged once it is on disk. The others get there within
+    /// about `interval`.
+    ///
+    /// # Errors
+    /// [`StoreError::State`] where the folder cannot be written to, or holds a newer version.
+    pub fn keep(
+        &mut self,
+        mut state: State,
+        interval: Duration,
+        durability: Durability,
+    ) -> Result<(), StoreError> {
+        let snapshot = self.graph.snapshot();
+        state.replace(&Image::of(&snapshot).map_err(StateError::from)?)?;
+        let bell = event(&self.node, REQUESTS_EVENT)?
+            .notifier_builder()
+            .create()
+            .map_err(|e| ipc("the state's bell", e))?;
+        let bell = move || {
+            if let Err(error) = bell.notify() {
+                tracing::debug!("waking the store: {error}");
+            }
+        };
+        let keeper = Keeper::start(state, &snapshot, interval, Box::new(bell));
+        self.keeper = Some(keeper.map_err(StoreError::Thread)?);
+        self.durability = durability;
         Ok(())
     }
 
@@ -120,12 +170,56 @@ impl Store {
     fn decide(&mut self, transaction: &Transaction, agent: &str, time: Time) -> Answer {
         // Agents at the edge of a tick may be a tick apart; the graph's time does not run back.
         self.last_time = self.last_time.max(time);
+        let durable = self.durability_of(transaction);
+        if durable {
+            self.can_keep()?;
+        }
         let (commit, change) = self.graph.commit(transaction, agent, self.last_time)?;
         if let Err(error) = self.changes.send(&change) {
             // The commit stands; who listens sees the gap and reads the snapshot.
             tracing::warn!("change {} was not sent: {error}", commit.version);
         }
+        if let Some(keeper) = &self.keeper {
+            keeper.note(&change, self.graph.snapshot(), durable);
+        }
         Ok(commit)
+    }
+
+    /// Whether the commit is to be acknowledged only once it is on disk.
+    fn durability_of(&self, transaction: &Transaction) -> bool {
+        let asked = match transaction.durability {
+            Durability::AsTheStore => self.durability,
+            other => other,
+        };
+        asked == Durability::OnDisk
+    }
+
+    fn can_keep(&self) -> Result<(), Refusal> {
+        let refused = |reason: &str| Err(Refusal::NotDurable(reason.to_owned()));
+        match &self.keeper {
+            None => refused("the store keeps no state; start it with --state"),
+            Some(keeper) => keeper.failure().map_or(Ok(()), refused),
+        }
+    }
+
+    /// Tells those who waited for it that their commit is on disk, or that it will not be.
+    fn answer_waiting(&mut self) -> Result<usize, InstanceError> {
+        let Some(keeper) = &self.keeper else {
+            return Ok(0);
+        };
+        // Looked at before what is durable: what was written before a failure counts.
+        let failed = keeper.failure().is_some();
+        let durable = keeper.durable();
+        let before = self.waiting.len();
+        let (told, waiting) = std::mem::take(&mut self.waiting)
+            .into_iter()
+            .partition(|(_, commit)| failed || commit.version <= durable);
+        self.waiting = waiting;
+        for (asker, mut commit) in told {
+            commit.durable = commit.version <= durable;
+            reply(&asker, &Ok(commit))?;
+        }
+        Ok(before - self.waiting.len())
     }
 
     /// Answers every request that has come, waiting up to `patience` for the first. How many.
@@ -136,32 +230,35 @@ impl Store {
         self.graph.announce();
         wait(&self.wake, patience, "waiting for requests")?;
         self.arena.serve_newcomers();
-        let mut served = 0;
+        let mut served = self.answer_waiting()?;
         while let Some(active) = self
             .server
             .receive()
             .map_err(|e| ipc("receiving a request", e))?
         {
-            let answer = match postcard::from_bytes::<Request>(active.payload()) {
-                Err(error) => Err(Refusal::Malformed(error.to_string())),
-                Ok(request) => match self.answered.get(&request.client) {
-                    Some((last, answer)) if *last == request.sequence => answer.clone(),
-                    _ => {
-                        let answer =
-                            self.decide(&request.transaction, &request.agent, request.time);
-                        let entry = (request.sequence, answer.clone());
-                        self.answered.insert(request.client, entry);
-                        answer
-                    }
-                },
-            };
-            let bytes = postcard::to_stdvec(&answer).map_err(|e| ipc("encoding an answer", e))?;
-            match active.loan_slice_uninit(bytes.len()) {
-                // A client that went away meanwhile does not hear; that is its affair.
-                Ok(response) => drop(response.write_from_slice(&bytes).send()),
-                Err(error) => tracing::warn!("an answer was not sent: {error}"),
-            }
             served += 1;
+            let request = match postcard::from_bytes::<Request>(active.payload()) {
+                Ok(request) => request,
+                Err(error) => {
+                    reply(&active, &Err(Refusal::Malformed(error.to_string())))?;
+                    continue;
+                }
+            };
+            let answer = match self.answered.get(&request.client) {
+                Some((last, answer)) if *last == request.sequence => answer.clone(),
+                _ => {
+                    let answer = self.decide(&request.transaction, &request.agent, request.time);
+                    let entry = (request.sequence, answer.clone());
+                    self.answered.insert(request.client, entry);
+                    answer
+                }
+            };
+            match answer {
+                Ok(commit) if self.durability_of(&request.transaction) => {
+                    self.waiting.push((active, commit));
+                }
+                answer => reply(&active, &answer)?,
+            }
         }
         if served > 0
             && let Err(error) = self.commits.notify()
@@ -182,6 +279,17 @@ impl Store {
             );
         }
     }
+}
+
+/// Answers a request.
+fn reply(asker: &Asker, answer: &Answer) -> Result<(), InstanceError> {
+    let bytes = postcard::to_stdvec(answer).map_err(|e| ipc("encoding an answer", e))?;
+    match asker.loan_slice_uninit(bytes.len()) {
+        // A client that went away meanwhile does not hear; that is its affair.
+        Ok(response) => drop(response.write_from_slice(&bytes).send()),
+        Err(error) => tracing::warn!("an answer was not sent: {error}"),
+    }
+    Ok(())
 }
 
 /// A number that no other store of this instance had: the time of day, in nanoseconds.

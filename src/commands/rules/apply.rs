@@ -134,8 +134,8 @@ fn operations(
         Err(refused) => return Ok(Err(refused.to_string())),
     };
     let transaction = Transaction {
-        preconditions: Vec::new(),
         operations: operations.clone(),
+        ..Transaction::new()
     };
     let committed = graph.commit(&transaction, "rules", Time::default());
     Ok(committed

@@ -86,6 +86,15 @@ impl Process {
         line.trim_end().to_owned()
     }
 
+    /// Kills it with signal 9, and gives all that it said before.
+    pub(crate) fn kill_and_hear(mut self) -> String {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
+        let mut said = String::new();
+        self.output.read_to_string(&mut said).unwrap();
+        said
+    }
+
     /// Kills it with signal 9.
     pub(crate) fn kill(mut self) {
         self.child.kill().unwrap();

@@ -109,8 +109,8 @@ fn commit(graph: &mut Graph, acts: &[Act]) -> Option<Change> {
     let all: Vec<Vec<Operation>> = acts.iter().map(|act| operations(act, &snapshot)).collect();
     (1..=all.len()).rev().find_map(|count| {
         let transaction = Transaction {
-            preconditions: vec![],
             operations: all[..count].concat(),
+            ..Transaction::new()
         };
         let committed = graph.commit(&transaction, "test", Time::default());
         committed.ok().map(|(_, change)| change)
