@@ -1,6 +1,12 @@
 //! The command line: every verb with its flags. Parsing a flag does nothing but parse it.
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+mod mission;
+mod path;
+
+pub(crate) use mission::{Mission, MissionAction, SubmitMission};
+pub(crate) use path::{CostModel, Path, PathAlgorithm};
+
+use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
 /// A runtime in which the agents of a robot share one world model.
@@ -38,6 +44,11 @@ pub(crate) enum Verb {
         Example:\n  cortex plan rules.aggl world.json goal.aggt --optimal"
     )]
     Plan(Plan),
+    /// Submit, list, show, pause, resume and cancel the missions of a running instance
+    #[command(
+        after_help = "Example:\n  cortex mission submit fetch.aggt --priority 2 --deadline 120"
+    )]
+    Mission(Mission),
     /// Find the cheapest path over a grid map, or check a list of known ones
     #[command(
         after_help = "Cells are X,Y from the upper left; costs and lengths are in cells.\n\n\
@@ -345,59 +356,4 @@ fn seconds(text: &str) -> Result<f64, String> {
     } else {
         Err("the time must be more than 0 seconds".to_owned())
     }
-}
-
-#[derive(Debug, Clone, Args)]
-#[command(group = clap::ArgGroup::new("grid_source").required(true))]
-pub(crate) struct Path {
-    /// A `MovingAI` map
-    #[arg(long, value_name = "F.map", group = "grid_source")]
-    pub(crate) map: Option<PathBuf>,
-    /// A map with a cost a cell
-    #[arg(long, value_name = "F.wmap", group = "grid_source")]
-    pub(crate) grid: Option<PathBuf>,
-    /// Problems with their optimal lengths, each of which is checked
-    #[arg(long, value_name = "F.scen", requires = "map", conflicts_with_all = ["from", "to"])]
-    pub(crate) scen: Option<PathBuf>,
-    /// Where the path begins
-    #[arg(long, value_name = "X,Y", value_parser = cell, required_unless_present = "scen")]
-    pub(crate) from: Option<(usize, usize)>,
-    /// Where it ends
-    #[arg(long, value_name = "X,Y", value_parser = cell, required_unless_present = "scen")]
-    pub(crate) to: Option<(usize, usize)>,
-    /// What a step costs
-    #[arg(long, value_enum, default_value_t = CostModel::LengthMean)]
-    pub(crate) model: CostModel,
-    /// How the search orders the cells it looks at; the cost is the same
-    #[arg(long, value_enum, default_value_t = PathAlgorithm::AStar)]
-    pub(crate) algorithm: PathAlgorithm,
-    /// For machines
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-#[value(rename_all = "snake_case")]
-pub(crate) enum CostModel {
-    /// Length times the mean cost of both cells
-    LengthMean,
-    /// Length times the cost of the cell stepped on
-    LengthDest,
-    /// The cost of each cell on the path
-    NodeSum,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum PathAlgorithm {
-    /// By cost so far
-    Dijkstra,
-    /// By cost so far and the least that can remain
-    #[value(name = "astar")]
-    AStar,
-}
-
-fn cell(text: &str) -> Result<(usize, usize), String> {
-    let cell = text.split_once(',');
-    let cell = cell.and_then(|(x, y)| Some((x.trim().parse().ok()?, y.trim().parse().ok()?)));
-    cell.ok_or_else(|| "a cell is X,Y: two whole numbers from 0".to_owned())
 }

@@ -4,7 +4,8 @@
 
 use crate::progress::Progress;
 use crate::supervise::{Hold, Notice, Policy, Program, SuperviseError, Supervisor};
-use dsr::{Image, Instance, ReadError, Session, Snapshot, Subscriber, Tick, Time, Value};
+use dsr::{Image, Instance, ReadError, Session, Snapshot, Subscriber, Tick, Time};
+use executive::{Mission, MissionStatus};
 use scenarios::process::{TICK, TRUTH, tick_time};
 use scenarios::{Scenario, Truth};
 use std::ffi::OsString;
@@ -48,25 +49,6 @@ pub(crate) enum ConductError {
     Hold(String),
 }
 
-/// A mission as the graph told of it at last.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct MissionState {
-    pub(crate) name: String,
-    pub(crate) goal: String,
-    pub(crate) status: String,
-    pub(crate) reason: String,
-    pub(crate) replans: u64,
-}
-
-/// A step of a plan as the graph told of it at last.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct StepState {
-    pub(crate) mission: String,
-    pub(crate) rule: String,
-    pub(crate) binding: String,
-    pub(crate) status: String,
-}
-
 /// What became of one process.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Account {
@@ -79,15 +61,15 @@ pub(crate) struct Account {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Recording {
     pub(crate) truths: Vec<Truth>,
-    pub(crate) missions: Vec<MissionState>,
-    pub(crate) steps: Vec<StepState>,
+    pub(crate) missions: Vec<Mission>,
     pub(crate) accounts: Vec<Account>,
 }
 
 impl Recording {
     /// Whether every mission has succeeded.
     pub(crate) fn succeeded(&self) -> bool {
-        !self.missions.is_empty() && self.missions.iter().all(|m| m.status == "succeeded")
+        let succeeded = |mission: &Mission| mission.status == MissionStatus::Succeeded;
+        !self.missions.is_empty() && self.missions.iter().all(succeeded)
     }
 }
 
@@ -341,7 +323,7 @@ impl<'a> Conductor<'a> {
 
     fn missions_are_over(&mut self, show: bool) -> Result<bool, ConductError> {
         let snapshot = self.session.snapshot()?;
-        let missions = match missions(&snapshot) {
+        let missions = match missions_with_steps(&snapshot) {
             // Overtaken while reading: the next look sees the next version.
             Err(ReadError::SnapshotTooOld { .. }) => return Ok(false),
             other => other?,
@@ -353,9 +335,8 @@ impl<'a> Conductor<'a> {
                 .truths
                 .last()
                 .map_or(0.0, |truth| truth.time.since(start));
-            let what = missions.iter().find(|m| m.status == "running");
-            let mut step = steps(&snapshot).unwrap_or_default().into_iter();
-            let step = step.rfind(|s| s.status == "running" || s.status == "dispatched");
+            let what = missions.iter().find(|m| m.status == MissionStatus::Running);
+            let step = what.and_then(|m| m.steps.iter().rfind(|s| s.status.is_under_way()));
             let text = match (what, step) {
                 (Some(mission), Some(step)) => format!("{}: {}", mission.name, step.rule),
                 (Some(mission), None) => mission.name.clone(),
@@ -378,13 +359,13 @@ impl<'a> Conductor<'a> {
                 };
                 self.progress.say(&format!(
                     "mission {} is {}{reason}",
-                    mission.name, mission.status
+                    mission.name,
+                    mission.status.name()
                 ));
             }
         }
         let all = missions.len() >= self.settings.scenario.missions.len();
-        let over = |m: &MissionState| matches!(m.status.as_str(), "succeeded" | "failed");
-        let ended = all && missions.iter().all(over);
+        let ended = all && missions.iter().all(|mission| mission.status.is_over());
         self.recording.missions = missions;
         Ok(ended)
     }
@@ -392,8 +373,7 @@ impl<'a> Conductor<'a> {
     /// Takes the last of what there is to report, then ends the processes.
     fn finish(mut self) -> Result<Recording, ConductError> {
         let snapshot = self.session.snapshot()?;
-        self.recording.missions = missions(&snapshot)?;
-        self.recording.steps = steps(&snapshot)?;
+        self.recording.missions = missions_with_steps(&snapshot)?;
         let members = std::iter::once(self.store).chain(self.agents.clone());
         let members: Vec<usize> = members.chain(std::iter::once(self.world)).collect();
         self.supervisor.stop();
@@ -421,62 +401,11 @@ impl<'a> Conductor<'a> {
     }
 }
 
-fn text(node: &dsr::Node<'_>, attribute: &str) -> Result<String, ReadError> {
-    let value = node.value(attribute)?;
-    Ok(value
-        .as_ref()
-        .and_then(Value::as_str)
-        .unwrap_or_default()
-        .to_owned())
-}
-
-fn number(node: &dsr::Node<'_>, attribute: &str) -> Result<f64, ReadError> {
-    Ok(node
-        .value(attribute)?
-        .as_ref()
-        .and_then(Value::as_f64)
-        .unwrap_or_default())
-}
-
-/// The missions in the graph, by id.
-fn missions(snapshot: &Snapshot) -> Result<Vec<MissionState>, ReadError> {
-    snapshot
-        .nodes_of("mission")
-        .map(|node| {
-            let node = node?;
-            Ok(MissionState {
-                name: node.name()?,
-                goal: text(&node, "goal")?,
-                status: text(&node, "status")?,
-                reason: text(&node, "reason")?,
-                replans: number(&node, "replans")? as u64,
-            })
-        })
-        .collect()
-}
-
-/// The steps of all plans in the graph, by id: in the order in which they were planned.
-fn steps(snapshot: &Snapshot) -> Result<Vec<StepState>, ReadError> {
-    let Some(label) = snapshot.schema().find_label("has_step") else {
-        return Ok(Vec::new());
-    };
-    snapshot
-        .nodes_of("step")
-        .map(|node| {
-            let node = node?;
-            let mission = match node.in_edges_of(label).next().transpose()? {
-                Some(edge) => snapshot
-                    .find_node(edge.from)?
-                    .map(|m| m.name())
-                    .transpose()?,
-                None => None,
-            };
-            Ok(StepState {
-                mission: mission.unwrap_or_default(),
-                rule: text(&node, "rule")?,
-                binding: text(&node, "binding")?,
-                status: text(&node, "status")?,
-            })
-        })
-        .collect()
+/// The missions in the graph with their steps, by id.
+fn missions_with_steps(snapshot: &Snapshot) -> Result<Vec<Mission>, ReadError> {
+    let mut missions = executive::missions(snapshot)?;
+    for mission in &mut missions {
+        mission.steps = executive::steps(snapshot, mission.id)?;
+    }
+    Ok(missions)
 }

@@ -19,7 +19,8 @@ pub mod task;
 mod testing;
 
 pub use mission::{
-    Config, Entry, Executive, MissionSpec, MissionStatus, Planner, RulePlanner, StepStatus,
+    Config, Entry, Executive, Mission, MissionSpec, MissionStatus, MissionStep, Planner,
+    Preemption, Request, RulePlanner, StepStatus, missions, steps,
 };
 pub use plan::{Options, Outcome, Raised, Status, Step, plan};
 pub use search::{Answer, Effort, Limits, Reachability, StopReason, search};

@@ -4,19 +4,21 @@
 //! and a transaction that got lost or came twice does no harm.
 
 mod adopt;
+mod attend;
 mod pursue;
 pub(crate) mod record;
 mod spec;
 #[cfg(test)]
 mod testing;
 
-pub use record::{MissionStatus, StepStatus};
+pub use record::{
+    Mission, MissionStatus, Preemption, Request, Step as MissionStep, StepStatus, missions, steps,
+};
 pub use spec::{Config, Entry, MissionSpec, Planner, RulePlanner};
 
 use crate::monitor::Monitor;
-use dsr::{ReadError, Snapshot, Time, Transaction, Value};
+use dsr::{ReadError, Snapshot, Time, Transaction};
 use grammar::{Goal, Grammar};
-use record::Mission;
 use std::collections::BTreeMap;
 
 /// What is remembered besides the graph, of the mission in hand only. Losing it costs a little
@@ -99,8 +101,14 @@ impl<P: Planner> Executive<P> {
     /// # Errors
     /// [`ReadError`]: take a new snapshot; nothing was decided.
     pub fn step(&mut self, now: Time, snapshot: &Snapshot) -> Result<Vec<Transaction>, ReadError> {
-        let missions = record::missions(snapshot)?;
+        let mut missions = record::missions(snapshot)?;
         let mut transactions = self.announce(now, snapshot, &missions)?;
+        let attended = self.attend(now, snapshot, &mut missions)?;
+        if !attended.is_empty() {
+            // What is pursued next is decided when this is in the graph.
+            transactions.extend(attended);
+            return Ok(transactions);
+        }
         let Some(mut before) = self.choose(missions) else {
             return Ok(transactions);
         };
@@ -136,17 +144,7 @@ impl<P: Planner> Executive<P> {
                 continue;
             }
             let mut transaction = Transaction::new();
-            let attributes = [
-                ("status", MissionStatus::Queued.name().into()),
-                ("goal", mission.goal.as_str().into()),
-                ("priority", Value::I64(mission.priority)),
-                ("replans", Value::U64(0)),
-                ("reason", "".into()),
-            ];
-            let attributes = attributes
-                .map(|(name, value)| (name.to_owned(), value))
-                .to_vec();
-            transaction.create_node("mission", &mission.name, attributes);
+            transaction.create_node("mission", &mission.name, mission.attributes());
             transactions.push(transaction);
             self.log(now, format!("mission `{}` is queued", mission.name), "");
         }
@@ -155,26 +153,29 @@ impl<P: Planner> Executive<P> {
 
     /// The mission in hand, else the next one.
     fn choose(&self, missions: Vec<Mission>) -> Option<Mission> {
-        let place = |mission: &Mission| {
-            let listed = self
-                .missions
-                .iter()
-                .position(|spec| spec.name == mission.name);
-            listed.unwrap_or(usize::MAX)
-        };
-        let rank = |mission: &Mission| {
-            let waits = mission.status != MissionStatus::Running;
-            (
-                waits,
-                std::cmp::Reverse(mission.priority),
-                place(mission),
-                mission.id,
-            )
-        };
         missions
             .into_iter()
-            .filter(|mission| !mission.status.is_over())
-            .min_by_key(rank)
+            .filter(Mission::is_ready)
+            .min_by_key(|mission| {
+                let waits = mission.status != MissionStatus::Running;
+                (waits, self.rank(mission))
+            })
+    }
+
+    /// Missions that are ready are taken in this order: by priority, deadline, place in the list
+    /// that the executive was given, and age.
+    fn rank(&self, mission: &Mission) -> impl Ord + use<P> {
+        let listed = self
+            .missions
+            .iter()
+            .position(|spec| spec.name == mission.name);
+        (
+            std::cmp::Reverse(mission.priority),
+            mission.deadline.is_none(),
+            mission.deadline,
+            listed.unwrap_or(usize::MAX),
+            mission.id,
+        )
     }
 
     fn goal(&mut self, text: &str) -> Result<Goal, String> {

@@ -4,6 +4,7 @@
 //! other rules were broken.
 
 use crate::{Condition, Name, Pattern, Rule, SourceFile};
+use dsr::{NodeType, Schema};
 use std::collections::BTreeMap;
 
 /// The rules of a file and of the files it includes.
@@ -89,6 +90,21 @@ pub struct TypeDeclaration {
 }
 
 impl Types {
+    /// The node types of a graph, for goals that are read without a grammar.
+    pub fn of_schema(schema: &Schema) -> Self {
+        let declaration = |node_type: &NodeType| TypeDeclaration {
+            names: vec![node_type.name.as_str().into()],
+            parents: node_type
+                .parents
+                .iter()
+                .map(|&parent| schema.type_name(parent).into())
+                .collect(),
+        };
+        Self {
+            declarations: schema.types().iter().map(declaration).collect(),
+        }
+    }
+
     /// Whether no type is declared, as in files from before 2017: then any type name is allowed.
     pub fn is_empty(&self) -> bool {
         self.declarations.is_empty()

@@ -295,6 +295,10 @@ pub struct Mission {
     pub goal: String,
     /// The larger, the sooner.
     pub priority: i64,
+    /// It fails where its goal does not hold by then, seconds after the start.
+    pub deadline: Option<f64>,
+    /// When it gives way to one of higher priority: `at_once`, `between_steps` or `never`.
+    pub preemption: String,
 }
 
 /// How recorded pedestrians map into the world, and where to begin.

@@ -3,7 +3,7 @@
 use crate::cli::Agent as Arguments;
 use crate::{Answer, Failure};
 use dsr::{AttachError, Begin, Instance, Pace, Session, Turns};
-use executive::MissionSpec;
+use executive::{MissionSpec, Preemption};
 use scenarios::{Scenario, Tracks, World};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -84,7 +84,11 @@ fn take_part(arguments: &Arguments, instance: &Instance, pace: Pace) -> Result<(
         "executive" => {
             let scenario = scenario()?;
             let (_, grammar) = super::load_rules(&scenario)?;
-            let missions = scenario.missions.iter().map(mission).collect();
+            let missions = scenario
+                .missions
+                .iter()
+                .map(|one| mission(&scenario, one))
+                .collect();
             let Some(session) = attach()? else {
                 return Ok(());
             };
@@ -121,10 +125,15 @@ fn attach(instance: &Instance, name: &str, stop: &AtomicBool) -> Result<Option<S
     }
 }
 
-fn mission(mission: &scenarios::scenario::Mission) -> MissionSpec {
+fn mission(scenario: &Scenario, mission: &scenarios::scenario::Mission) -> MissionSpec {
+    let preemption = Preemption::ALL
+        .into_iter()
+        .find(|policy| policy.name() == mission.preemption);
     MissionSpec {
         name: mission.name.clone(),
         goal: mission.goal.clone(),
         priority: mission.priority,
+        deadline: mission.deadline.map(|deadline| scenario.start + deadline),
+        preemption: preemption.unwrap_or_default(),
     }
 }

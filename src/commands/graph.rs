@@ -50,7 +50,7 @@ impl Source {
     }
 }
 
-fn attach(name: &str) -> Result<Session, Failure> {
+pub(crate) fn attach(name: &str) -> Result<Session, Failure> {
     let instance = super::instance(name)?;
     if !instance.exists() {
         return Err(Failure::input_with_help(

@@ -2,6 +2,7 @@
 
 mod agent;
 mod graph;
+mod mission;
 mod output;
 mod path;
 mod plan;
@@ -29,6 +30,7 @@ pub(crate) fn perform(verb: Verb) -> Result<Answer, Failure> {
         Verb::Graph(arguments) => graph::run(&arguments),
         Verb::Rules(arguments) => rules::run(&arguments),
         Verb::Plan(arguments) => plan::run(&arguments),
+        Verb::Mission(arguments) => mission::run(&arguments),
         Verb::Path(arguments) => path::run(&arguments),
     }
 }

@@ -2,10 +2,11 @@
 
 use super::output;
 use crate::cli::Run as Arguments;
-use crate::conduct::{MissionState, Recording, Settings, StepState, conduct};
+use crate::conduct::{Recording, Settings, conduct};
 use crate::progress::Progress;
 use crate::{Answer, Failure};
 use agents::social_mapping::config::SocialConfig;
+use executive::{Mission, MissionStep, StepStatus};
 use scenarios::metrics::{Metrics, ObjectSpace, measure, object_spaces};
 use scenarios::picture::{Picture, Run, png};
 use scenarios::report::{
@@ -133,7 +134,7 @@ impl Plan<'_> {
             success: recording.succeeded(),
             mission,
             metrics,
-            plan: recording.steps.iter().filter_map(step).collect(),
+            plan: plan(&recording.missions),
             replans: recording
                 .missions
                 .iter()
@@ -202,24 +203,32 @@ impl Plan<'_> {
     }
 }
 
-fn mission(state: &MissionState) -> MissionOutcome {
-    let reason = (!state.reason.is_empty()).then(|| state.reason.clone());
+fn mission(mission: &Mission) -> MissionOutcome {
+    let reason = (!mission.reason.is_empty()).then(|| mission.reason.clone());
     MissionOutcome {
-        name: state.name.clone(),
-        goal: state.goal.clone(),
-        status: state.status.clone(),
+        name: mission.name.clone(),
+        goal: mission.goal.clone(),
+        status: mission.status.name().to_owned(),
         reason,
     }
 }
 
-/// A step as the report has it; those of plans that were given up before they began are left out.
-fn step(state: &StepState) -> Option<StepReport> {
-    (state.status != "dropped").then(|| StepReport {
-        mission: state.mission.clone(),
-        rule: state.rule.clone(),
-        binding: serde_json::from_str(&state.binding).unwrap_or_default(),
-        status: state.status.clone(),
-    })
+/// The steps of all missions in the order in which they were planned; those of plans that were given
+/// up before they began are left out.
+fn plan(missions: &[Mission]) -> Vec<StepReport> {
+    let mut steps: Vec<_> = missions
+        .iter()
+        .flat_map(|mission| mission.steps.iter().map(move |step| (mission, step)))
+        .filter(|(_, step)| step.status != StepStatus::Dropped)
+        .collect();
+    steps.sort_by_key(|(_, step)| step.id);
+    let report = |(mission, step): (&Mission, &MissionStep)| StepReport {
+        mission: mission.name.clone(),
+        rule: step.rule.clone(),
+        binding: step.binding.clone(),
+        status: step.status.name().to_owned(),
+    };
+    steps.into_iter().map(report).collect()
 }
 
 /// Makes a folder, and takes out what an earlier run left in it.

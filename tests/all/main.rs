@@ -12,6 +12,7 @@ mod documentation;
 mod examples;
 mod faults;
 mod graph;
+mod missions;
 mod path;
 mod plan;
 mod rules;

@@ -17,28 +17,96 @@ pub enum MissionStatus {
     Queued,
     /// It is being carried out, or a plan is sought for it.
     Running,
+    /// Somebody asked for it to wait.
+    Paused,
     /// Its goal held.
     Succeeded,
     /// It was given up; `reason` says why.
     Failed,
+    /// Somebody asked for its end.
+    Cancelled,
 }
 
 impl MissionStatus {
-    const ALL: [Self; 4] = [Self::Queued, Self::Running, Self::Succeeded, Self::Failed];
+    const ALL: [Self; 6] = [
+        Self::Queued,
+        Self::Running,
+        Self::Paused,
+        Self::Succeeded,
+        Self::Failed,
+        Self::Cancelled,
+    ];
 
     /// As it stands in the graph.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Queued => "queued",
             Self::Running => "running",
+            Self::Paused => "paused",
             Self::Succeeded => "succeeded",
             Self::Failed => "failed",
+            Self::Cancelled => "cancelled",
         }
     }
 
     /// Whether the mission is over.
     pub const fn is_over(self) -> bool {
-        matches!(self, Self::Succeeded | Self::Failed)
+        matches!(self, Self::Succeeded | Self::Failed | Self::Cancelled)
+    }
+}
+
+/// When a mission gives way to one of higher priority.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Preemption {
+    /// Even in the middle of a step.
+    #[default]
+    AtOnce,
+    /// When no step of it is in an agent's hands.
+    BetweenSteps,
+    /// Not before it is over.
+    Never,
+}
+
+impl Preemption {
+    /// Each of them.
+    pub const ALL: [Self; 3] = [Self::AtOnce, Self::BetweenSteps, Self::Never];
+
+    /// As it stands in the graph.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::AtOnce => "at_once",
+            Self::BetweenSteps => "between_steps",
+            Self::Never => "never",
+        }
+    }
+}
+
+/// What somebody asks of a mission, by its attribute `request`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Request {
+    /// Let it wait; its step in hand is dropped.
+    Pause,
+    /// Let it go on.
+    Resume,
+    /// End it.
+    Cancel,
+}
+
+impl Request {
+    const ALL: [Self; 3] = [Self::Pause, Self::Resume, Self::Cancel];
+
+    /// As it stands in the graph.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Pause => "pause",
+            Self::Resume => "resume",
+            Self::Cancel => "cancel",
+        }
+    }
+
+    /// The request of that name.
+    pub fn find(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|request| request.name() == name)
     }
 }
 
@@ -94,34 +162,52 @@ impl StepStatus {
 
 /// A `mission` node with its steps.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Mission {
-    pub(crate) id: NodeId,
-    pub(crate) name: String,
-    pub(crate) goal: String,
-    pub(crate) status: MissionStatus,
-    pub(crate) priority: i64,
-    pub(crate) replans: u64,
-    pub(crate) reason: String,
+pub struct Mission {
+    /// Its node.
+    pub id: NodeId,
+    /// The name of its node.
+    pub name: String,
+    /// What shall hold, in AGGL.
+    pub goal: String,
+    /// How it stands.
+    pub status: MissionStatus,
+    /// The larger, the sooner.
+    pub priority: i64,
+    /// It fails where its goal does not hold by then.
+    pub deadline: Option<Time>,
+    /// When it gives way to one of higher priority.
+    pub preemption: Preemption,
+    /// What somebody asks of it and the executive has not done yet, as written.
+    pub request: String,
+    /// How many plans followed the first one.
+    pub replans: u64,
+    /// Why it stands as it does; empty where that is plain.
+    pub reason: String,
     /// By ascending index.
-    pub(crate) steps: Vec<Step>,
+    pub steps: Vec<Step>,
 }
 
 /// A `step` node.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Step {
+pub struct Step {
     /// `None` until it is in the graph.
-    pub(crate) id: Option<NodeId>,
-    pub(crate) name: String,
+    pub id: Option<NodeId>,
+    /// The name of its node: mission, plan and index, between slashes.
+    pub name: String,
     /// Counts through all plans of a mission: the steps of the plan in force are the open ones.
-    pub(crate) index: u64,
-    pub(crate) rule: String,
-    pub(crate) agent: String,
+    pub index: u64,
+    /// What is applied.
+    pub rule: String,
+    /// Who carries it out.
+    pub agent: String,
     /// Variable to node name.
-    pub(crate) binding: BTreeMap<String, String>,
-    pub(crate) status: StepStatus,
+    pub binding: BTreeMap<String, String>,
+    /// How it stands.
+    pub status: StepStatus,
     /// When the status was written.
-    pub(crate) since: Time,
-    pub(crate) reason: String,
+    pub since: Time,
+    /// Why it stands as it does; empty where that is plain.
+    pub reason: String,
 }
 
 impl fmt::Display for Step {
@@ -171,8 +257,12 @@ fn count(node: &Node, name: &str) -> Result<u64, ReadError> {
         .map_or(0, |value| value as u64))
 }
 
-/// All missions, without their steps, by ascending id.
-pub(crate) fn missions(snapshot: &Snapshot) -> Result<Vec<Mission>, ReadError> {
+/// All missions, without their steps, by ascending id. A status that nobody knows counts as queued,
+/// a preemption that nobody knows as the default.
+///
+/// # Errors
+/// [`ReadError`].
+pub fn missions(snapshot: &Snapshot) -> Result<Vec<Mission>, ReadError> {
     let mut missions = Vec::new();
     for node in snapshot.nodes_of("mission") {
         let node = node?;
@@ -184,12 +274,20 @@ pub(crate) fn missions(snapshot: &Snapshot) -> Result<Vec<Mission>, ReadError> {
             Some(Value::I64(priority)) => priority,
             _ => 0,
         };
+        let deadline = node.value("deadline")?.and_then(|value| value.as_f64());
+        let preemption = text(&node, "preemption")?;
+        let preemption = Preemption::ALL
+            .into_iter()
+            .find(|known| known.name() == preemption);
         missions.push(Mission {
             id: node.id(),
             name: node.name()?,
             goal: text(&node, "goal")?,
             status: known.unwrap_or(MissionStatus::Queued),
             priority,
+            deadline: deadline.map(Time::from_seconds),
+            preemption: preemption.unwrap_or_default(),
+            request: text(&node, "request")?,
             replans: count(&node, "replans")?,
             reason: text(&node, "reason")?,
             steps: Vec::new(),
@@ -201,7 +299,10 @@ pub(crate) fn missions(snapshot: &Snapshot) -> Result<Vec<Mission>, ReadError> {
 
 /// The steps of a mission, by ascending index. A status that nobody knows counts as dropped, a
 /// binding that cannot be read as empty.
-pub(crate) fn steps(snapshot: &Snapshot, mission: NodeId) -> Result<Vec<Step>, ReadError> {
+///
+/// # Errors
+/// [`ReadError`].
+pub fn steps(snapshot: &Snapshot, mission: NodeId) -> Result<Vec<Step>, ReadError> {
     let (Some(label), Some(status_id), Some(node)) = (
         snapshot.schema().find_label("has_step"),
         snapshot.schema().find_attribute("status"),
@@ -249,6 +350,9 @@ pub(crate) fn difference(before: &Mission, after: &Mission, seen: Version) -> Op
     }
     if before.reason != after.reason {
         transaction.set(mission.clone(), "reason", after.reason.as_str());
+    }
+    if before.request != after.request {
+        transaction.set(mission.clone(), "request", after.request.as_str());
     }
     if before.replans != after.replans {
         transaction.set(mission.clone(), "replans", Value::U64(after.replans));

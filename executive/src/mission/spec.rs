@@ -1,8 +1,9 @@
 //! What the executive is given and what it tells: missions, settings, a planner, its journal. This
 //! file owns the figures that decide how long it waits and how often it tries.
 
+use super::{MissionStatus, Preemption};
 use crate::{Limits, Options, Outcome};
-use dsr::{ReadError, Snapshot, Time};
+use dsr::{ReadError, Snapshot, Time, Value};
 use grammar::{Goal, Grammar};
 
 /// What a scenario wants done.
@@ -12,8 +13,35 @@ pub struct MissionSpec {
     pub name: String,
     /// What shall hold, in AGGL (`.aggt`).
     pub goal: String,
-    /// The larger, the sooner.
+    /// The larger, the sooner; of equals, the one with the earlier deadline.
     pub priority: i64,
+    /// It fails where its goal does not hold by then.
+    pub deadline: Option<Time>,
+    /// When it gives way to one of higher priority.
+    pub preemption: Preemption,
+}
+
+impl MissionSpec {
+    /// The attributes of its node, as it begins: queued.
+    pub fn attributes(&self) -> Vec<(String, Value)> {
+        let deadline = self
+            .deadline
+            .map(|deadline| ("deadline", Value::F64(deadline.seconds())));
+        let others = [
+            ("status", MissionStatus::Queued.name().into()),
+            ("goal", self.goal.as_str().into()),
+            ("priority", Value::I64(self.priority)),
+            ("preemption", self.preemption.name().into()),
+            ("request", "".into()),
+            ("replans", Value::U64(0)),
+            ("reason", "".into()),
+        ];
+        others
+            .into_iter()
+            .chain(deadline)
+            .map(|(name, value)| (name.to_owned(), value))
+            .collect()
+    }
 }
 
 /// Makes plans.

@@ -3,6 +3,7 @@
 
 use super::diagnostic::{Problem, ProblemKind, suggest};
 use super::reader::{Bound, Located, Problems, Table};
+use super::value::Preemption;
 use super::{Activity, Mission, Scenario, TracksFrame};
 use super::{devices, people, space};
 use dsr::Time;
@@ -287,12 +288,17 @@ fn missions(scenario: &Table<'_>, names: &mut Names<'_>, read: Read<'_>) -> Vec<
             .as_ref()
             .map(|path| file(&table, "goal", &path.value, read));
         let priority = table.get("priority").map_or(0, |priority| priority.value);
+        let deadline = table.get::<f64>("deadline").map(|deadline| deadline.value);
+        let preemption = table.get::<Preemption>("preemption");
+        let preemption = preemption.map_or(Preemption::default(), |policy| policy.value);
         if let (Some(name), Some(path), Some(goal)) = (name, path, goal) {
             missions.push(Mission {
                 name,
                 file: path.value,
                 goal,
                 priority,
+                deadline,
+                preemption: preemption.0,
             });
         }
         table.close();

@@ -382,6 +382,11 @@ fn each_kind_of_mistake_is_told_apart() {
         ("end = \"10:30\"", "end = \"25:30\"", |p| {
             matches!(p, P::NotATime { .. })
         }),
+        (
+            "visit.aggt\"",
+            "visit.aggt\"\npreemption = \"maybe\"",
+            |p| matches!(p, P::WrongType { .. }),
+        ),
         ("visit.aggt", "call.aggt", |p| {
             matches!(p, P::UnreadableFile { .. })
         }),

@@ -55,6 +55,24 @@ impl Value for String {
     }
 }
 
+/// When a mission gives way to one of higher priority.
+pub(super) struct Preemption(pub(super) String);
+
+impl Default for Preemption {
+    fn default() -> Self {
+        Self("at_once".to_owned())
+    }
+}
+
+impl Value for Preemption {
+    const EXPECTED: &'static str = "\"at_once\", \"between_steps\" or \"never\"";
+    fn read(value: &DeValue<'_>) -> Option<Self> {
+        let name = String::read(value)?;
+        let known = ["at_once", "between_steps", "never"].contains(&name.as_str());
+        known.then_some(Self(name))
+    }
+}
+
 impl<const N: usize> Value for [f64; N] {
     const EXPECTED: &'static str = match N {
         2 => "two numbers, as [x, y]",

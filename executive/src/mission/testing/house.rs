@@ -7,7 +7,7 @@
 
 use super::RULES;
 use crate::testing::{centre, read};
-use crate::{Config, Executive, MissionSpec, Options, Outcome, Planner, RulePlanner};
+use crate::{Config, Executive, MissionSpec, Options, Outcome, Planner, Preemption, RulePlanner};
 use dsr::{EdgeKey, Graph, Node, NodeId, ReadError, Snapshot, Time, Transaction, Value};
 use grammar::{Goal, Grammar};
 use std::cell::Cell;
@@ -73,6 +73,8 @@ impl House {
                     name,
                     goal,
                     priority,
+                    deadline: None,
+                    preemption: Preemption::default(),
                 }
             })
             .collect();
