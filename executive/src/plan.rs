@@ -2,11 +2,13 @@
 //! owns what the outcome says; it guarantees that each step of a plan is applicable after those
 //! before it, and that the goal holds at the end.
 
+mod reason;
+
 use crate::ground::{
     Environment, Ground, Instance, Operator, Problem, ProblemError, Reached, build,
 };
 use crate::search::{Answer, Effort, Limits, Reachability, search};
-use crate::task::{Literal, Micro, from_micro};
+use crate::task::{Micro, from_micro};
 use dsr::{ReadError, Snapshot};
 use grammar::{Goal, Grammar};
 use serde::Serialize;
@@ -36,6 +38,9 @@ pub struct Step {
     /// What to call the nodes that it creates, by variable, until they are there.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub creates: BTreeMap<String, String>,
+    /// The nodes of the binding, then of what it creates, in the order in which the rule names them.
+    #[serde(skip)]
+    pub arguments: Vec<String>,
     /// The agent that carries it out, where the rule names one.
     pub agent: Option<String>,
     /// What it costs.
@@ -95,7 +100,7 @@ impl Default for Options {
 }
 
 impl Outcome {
-    fn without_plan(status: Status, reason: String, expanded: u64) -> Self {
+    pub(crate) fn without_plan(status: Status, reason: String, expanded: u64) -> Self {
         Self {
             status,
             optimal: false,
@@ -146,15 +151,62 @@ pub fn plan(
     options: &Options,
     limits: &mut Limits<'_>,
 ) -> Result<Outcome, ReadError> {
-    match Problem::read(grammar, snapshot, goal, options.spares) {
-        Ok(problem) => Ok(solve(&problem, options, limits)),
-        Err(ProblemError::Read(error)) => Err(error),
-        Err(ProblemError::Goal(reason)) => Ok(Outcome::without_plan(Status::Unsolvable, reason, 0)),
+    let mut spares = options.spares.min(FEW_SPARES);
+    let mut best: Option<Outcome> = None;
+    let mut tried = false;
+    loop {
+        let problem = match Problem::read(grammar, snapshot, goal, spares) {
+            Ok(problem) => problem,
+            Err(ProblemError::Read(error)) => return Err(error),
+            Err(ProblemError::Goal(reason)) => {
+                return Ok(Outcome::without_plan(Status::Unsolvable, reason, 0));
+            }
+        };
+        let few = Options {
+            spares,
+            ..options.clone()
+        };
+        let outcome = solve(&problem, &few, limits);
+        if outcome.status == Status::Unsolvable && spares > 0 && !tried {
+            tried = true;
+            // As many new nodes as any rule can tell apart: more of them are more of the same.
+            let operators = problem.program.operators.iter().chain([&problem.goal]);
+            let told_apart = operators.map(|o| o.slots).max().unwrap_or_default();
+            if let Ok(problem) = Problem::read(grammar, snapshot, goal, told_apart)
+                && let Some(outcome) = prove(&problem, options, limits)
+            {
+                return Ok(outcome);
+            }
+        }
+        // More new nodes change nothing where none are made, or a first plan was all that was asked.
+        let settled = spares >= options.spares
+            || !problem.program.operators.iter().any(Operator::creates)
+            || outcome.optimal
+            || outcome.status == Status::Limit
+            || outcome.status == Status::Solved && options.effort == Effort::First;
+        let better = match (&best, &outcome) {
+            (Some(best), outcome) => outcome.cost.is_some() && outcome.cost <= best.cost,
+            (None, _) => true,
+        };
+        if settled || outcome.status == Status::Solved && better {
+            let kept = if better { Some(outcome) } else { best.take() };
+            if settled {
+                return Ok(kept.unwrap_or_else(|| {
+                    Outcome::without_plan(Status::Limit, String::new(), limits.expanded())
+                }));
+            }
+            best = kept;
+        }
+        spares = (2 * spares).min(options.spares);
     }
 }
 
+/// So many new nodes are offered to each rule at first, then twice as many and so on: what more
+/// could be made costs nothing until it is needed.
+const FEW_SPARES: usize = 2;
+
 /// Plans for a problem that was read.
-pub(crate) fn solve(problem: &Problem, options: &Options, limits: &mut Limits<'_>) -> Outcome {
+fn solve(problem: &Problem, options: &Options, limits: &mut Limits<'_>) -> Outcome {
     let awake = problem.awake(&options.awake);
     let reached = match problem.reach(&awake, limits) {
         Ok(reached) => reached,
@@ -163,32 +215,7 @@ pub(crate) fn solve(problem: &Problem, options: &Options, limits: &mut Limits<'_
             return Outcome::without_plan(Status::Limit, reason, limits.expanded());
         }
     };
-    let raised: Vec<(usize, Environment, f64)> = options
-        .raised
-        .iter()
-        .filter_map(|raised| {
-            let operator = problem.operator(&raised.rule)?;
-            let binding = raised.binding.iter();
-            let binding = binding.map(|(v, n)| (v.as_str(), n.as_str()));
-            let environment = problem.environment(operator, binding)?;
-            Some((operator, environment, raised.by))
-        })
-        .collect();
-    let extra = |instance: &Instance| -> f64 {
-        let bound = problem.program.operators[instance.operator].bound;
-        let same = raised.iter().filter(|(operator, environment, _)| {
-            *operator == instance.operator && environment[..bound] == instance.objects[..bound]
-        });
-        same.map(|(_, _, by)| by).sum()
-    };
-    let ground = build(
-        &problem.program,
-        &problem.goal,
-        &problem.world.facts,
-        &awake,
-        &reached,
-        &extra,
-    );
+    let ground = ground(problem, options, &awake, &reached);
     match search(&ground.task, options.effort, limits) {
         Answer::Solved {
             actions,
@@ -211,19 +238,60 @@ pub(crate) fn solve(problem: &Problem, options: &Options, limits: &mut Limits<'_
             }
         }
         Answer::Unsolvable => {
-            let reason = why_unsolvable(problem, options, &reached, &ground, limits.expanded());
-            Outcome::without_plan(Status::Unsolvable, reason, limits.expanded())
+            let spares = Some(options.spares);
+            let expanded = limits.expanded();
+            let reason =
+                reason::why_unsolvable(problem, options, spares, &reached, &ground, expanded);
+            Outcome::without_plan(Status::Unsolvable, reason, expanded)
         }
         Answer::Stopped(stop) => {
-            let reason = format!(
-                "stopped with no plan yet: {stop} ({} facts, {} actions, {} states expanded)",
-                ground.task.facts(),
-                ground.task.actions().len(),
-                limits.expanded()
-            );
+            let reason = reason::how_far(problem, &ground, stop, limits);
             Outcome::without_plan(Status::Limit, reason, limits.expanded())
         }
     }
+}
+
+/// The ground task, in which some steps are dearer than their rules say.
+fn ground(problem: &Problem, options: &Options, awake: &[bool], reached: &Reached) -> Ground {
+    let raised: Vec<(usize, Environment, f64)> = options
+        .raised
+        .iter()
+        .filter_map(|raised| {
+            let operator = problem.operator(&raised.rule)?;
+            let binding = raised.binding.iter();
+            let binding = binding.map(|(v, n)| (v.as_str(), n.as_str()));
+            let environment = problem.environment(operator, binding)?;
+            Some((operator, environment, raised.by))
+        })
+        .collect();
+    let extra = |instance: &Instance| -> f64 {
+        let bound = problem.program.operators[instance.operator].bound;
+        let same = raised.iter().filter(|(operator, environment, _)| {
+            *operator == instance.operator && environment[..bound] == instance.objects[..bound]
+        });
+        same.map(|(_, _, by)| by).sum()
+    };
+    build(
+        &problem.program,
+        &problem.goal,
+        &problem.world.facts,
+        awake,
+        reached,
+        &extra,
+    )
+}
+
+/// The outcome where even the relaxed task does not reach the goal.
+fn prove(problem: &Problem, options: &Options, limits: &mut Limits<'_>) -> Option<Outcome> {
+    let awake = problem.awake(&options.awake);
+    let reached = problem.reach(&awake, limits).ok()?;
+    let ground = ground(problem, options, &awake, &reached);
+    if reached.truncated || Reachability::new(&ground.task).goal {
+        return None;
+    }
+    let expanded = limits.expanded();
+    let reason = reason::why_unsolvable(problem, options, None, &reached, &ground, expanded);
+    Some(Outcome::without_plan(Status::Unsolvable, reason, expanded))
 }
 
 /// What a plan costs by its rules alone.
@@ -261,66 +329,10 @@ fn step(problem: &Problem, reached: &Reached, ground: &Ground, action: usize) ->
         rule: operator.name.clone(),
         binding: named.by_ref().take(operator.bound).collect(),
         creates: named.collect(),
+        arguments: problem.arguments(instance),
         agent: operator.agent.clone(),
         cost: from_micro(ground.costs[action]),
     }
-}
-
-fn why_unsolvable(
-    problem: &Problem,
-    options: &Options,
-    reached: &Reached,
-    ground: &Ground,
-    expanded: u64,
-) -> String {
-    let mut reasons = problem.unreachable(reached);
-    if reasons.is_empty() && !Reachability::new(&ground.task).goal {
-        reasons.extend(unreachable_literals(problem, ground));
-    }
-    if reasons.is_empty() {
-        reasons.push(if reached.goals.is_empty() {
-            "no choice of nodes fits all of the goal at once".to_owned()
-        } else if !Reachability::new(&ground.task).goal {
-            "no rule brings about what the goal's condition asks for".to_owned()
-        } else {
-            format!("no order of steps works: all {expanded} states that matter were tried")
-        });
-    }
-    if options.raised.iter().any(|raised| raised.by.is_infinite()) {
-        reasons.push("steps that failed lately were left out".to_owned());
-    }
-    if problem.program.operators.iter().any(Operator::creates) {
-        reasons.push(format!(
-            "each rule was given {} new nodes at most",
-            options.spares
-        ));
-    }
-    if reached.truncated {
-        reasons.push("attributes were followed through their first values only".to_owned());
-    }
-    reasons.extend(problem.program.notes.iter().cloned());
-    reasons.extend(ground.notes.iter().cloned());
-    reasons.join("; ")
-}
-
-/// The literals of the goal that even the relaxed task cannot reach.
-fn unreachable_literals(problem: &Problem, ground: &Ground) -> Vec<String> {
-    let reachability = Reachability::new(&ground.task);
-    let mut missing: Vec<Literal> = Vec::new();
-    ground.task.goal().each_literal(&mut |literal| {
-        if !reachability.literal(literal) && !missing.contains(&literal) {
-            missing.push(literal);
-        }
-    });
-    let words = missing.into_iter().filter_map(|literal| {
-        let atom = problem.atom(ground.atoms[literal.fact() as usize])?;
-        Some(if literal.negated() {
-            format!("{atom} holds, and nothing takes it away")
-        } else {
-            format!("{atom} cannot be reached")
-        })
-    });
-    words.take(4).collect()
 }
 
 #[cfg(test)]

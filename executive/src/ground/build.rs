@@ -11,7 +11,7 @@ use super::facts::Facts;
 use super::program::{Link, Object, Operator, Place, Program};
 use super::reach::{Instance, Reached, combinations};
 use super::value::{amount, evaluate};
-use crate::task::{Action, Effect, Fact, Formula, Literal, Micro, Task, micro};
+use crate::task::{Action, Effect, Fact, Formula, Micro, Task, keep, micro, relevant};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeMap;
 
@@ -152,59 +152,20 @@ pub(crate) fn build(
         costs.push(cost);
     }
     let relevant = relevant(builder.atoms.len(), &wanted, &actions);
-    let keep = |index: usize| relevant[index];
     let holding = |&fact: &Fact| builder.holds_at_first(builder.atoms[fact as usize]);
     let first: Vec<Fact> = (0..builder.atoms.len() as Fact).filter(holding).collect();
     Ground {
-        task: Task::new(builder.atoms.len(), &first, wanted, filter(actions, keep)),
-        actions: filter(which, keep),
-        costs: filter(costs, keep),
+        task: Task::new(
+            builder.atoms.len(),
+            &first,
+            wanted,
+            keep(actions, &relevant),
+        ),
+        actions: keep(which, &relevant),
+        costs: keep(costs, &relevant),
         atoms: builder.atoms,
         notes,
     }
-}
-
-fn filter<T>(list: Vec<T>, keep: impl Fn(usize) -> bool) -> Vec<T> {
-    let kept = list
-        .into_iter()
-        .enumerate()
-        .filter(|(index, _)| keep(*index));
-    kept.map(|(_, item)| item).collect()
-}
-
-/// Which actions may matter to the goal: those that bring about what it, or another such action,
-/// asks for.
-fn relevant(facts: usize, goal: &Formula, actions: &[Action]) -> Vec<bool> {
-    let mut makers: Vec<Vec<usize>> = vec![Vec::new(); facts * 2];
-    for (index, action) in actions.iter().enumerate() {
-        for effect in &action.effects {
-            let added = effect.add.iter().map(|&f| Literal::positive(f));
-            let deleted = effect.delete.iter().map(|&f| Literal::negative(f));
-            for literal in added.chain(deleted) {
-                makers[literal.index()].push(index);
-            }
-        }
-    }
-    let mut wanted = vec![false; facts * 2];
-    let mut relevant = vec![false; actions.len()];
-    let mut open = Vec::new();
-    goal.each_literal(&mut |literal| open.push(literal));
-    while let Some(literal) = open.pop() {
-        if std::mem::replace(&mut wanted[literal.index()], true) {
-            continue;
-        }
-        for &index in &makers[literal.index()] {
-            if !std::mem::replace(&mut relevant[index], true) {
-                let action = &actions[index];
-                let visit = &mut |literal| open.push(literal);
-                action.precondition.each_literal(visit);
-                for effect in &action.effects {
-                    effect.condition.each_literal(visit);
-                }
-            }
-        }
-    }
-    relevant
 }
 
 impl<'a> Builder<'a> {
@@ -331,7 +292,11 @@ impl<'a> Builder<'a> {
                         }
                         let entry = changes.entry(both).or_default();
                         entry.0.push(Atom::Value(place, index));
-                        let others = others.filter(|&other| other != index);
+                        // Where the old value is part of the choice, it is the only one to go.
+                        let before = choice.iter().find(|(known, _)| *known == place);
+                        let others = others.filter(|&other| {
+                            other != index && before.is_none_or(|&(_, old)| old == other)
+                        });
                         entry
                             .1
                             .extend(others.map(|other| Atom::Value(place, other)));

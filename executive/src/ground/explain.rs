@@ -157,8 +157,38 @@ impl Problem {
                 let what = words.types(&operator.variables[slot].types);
                 format!("rule `{rule}` needs another {what}")
             }
-            Missing::Condition => format!("the condition of rule `{rule}` cannot hold there"),
+            Missing::Condition => match self.forbidden(operator, &lack.environment) {
+                Some(what) => format!("rule `{rule}` needs {what}"),
+                None => format!("the condition of rule `{rule}` cannot hold there"),
+            },
         }
+    }
+
+    /// What of an operator's conditions never holds at a binding, in words.
+    fn forbidden(&self, operator: &Operator, environment: &[Object]) -> Option<String> {
+        let words = self.words();
+        let whole = |slot: u32| environment[slot as usize] != UNBOUND;
+        let kept = operator.absent.iter().find(|link| {
+            whole(link.from)
+                && whole(link.to)
+                && self.world.facts.has_link(link.at(environment))
+                && !self.program.removed[usize::from(link.label)]
+        });
+        if let Some(link) = kept {
+            let link = words.link(*link, operator, environment);
+            return Some(format!(
+                "that {link} does not hold, but no rule takes it away"
+            ));
+        }
+        if environment[..operator.bound].contains(&UNBOUND) {
+            return None;
+        }
+        let broken = operator.tests.iter().find(|test| {
+            let mut environment = environment.to_vec();
+            always(test, &self.program, &self.world.facts, &mut environment) == Some(false)
+        })?;
+        let test = words.test(broken, operator, environment);
+        Some(format!("{test}, which never holds there"))
     }
 
     /// Whether some rule makes links of that label between such types.

@@ -19,7 +19,7 @@ mod words;
 mod world;
 
 pub(crate) use build::{Atom, Ground, build};
-pub(crate) use program::{Environment, Object, Operator, UNBOUND, Variable};
+pub(crate) use program::{Environment, Object, Operator, Place, UNBOUND, Variable};
 pub(crate) use reach::{Instance, Reached, reach};
 
 use crate::search::{Limits, StopReason};
@@ -135,6 +135,15 @@ impl Problem {
     /// The name of an object.
     pub(crate) fn name(&self, object: Object) -> &str {
         &self.names[object as usize]
+    }
+
+    /// The names of what the variables of an instance's rule stand for.
+    pub(crate) fn arguments(&self, instance: &Instance) -> Vec<String> {
+        let count = self.program.operators[instance.operator].variables.len();
+        let objects = instance.objects[..count].iter();
+        objects
+            .map(|&object| self.name(object).to_owned())
+            .collect()
     }
 
     pub(crate) fn words(&self) -> Words<'_> {

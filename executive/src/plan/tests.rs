@@ -123,7 +123,7 @@ fn at_a_limit_it_says_how_far_it_came() {
     let stopped = plan(&grammar, &snapshot, &goal, &options, &mut limits).unwrap();
     expect![[r"
         Limit
-        stopped with no plan yet: as many states were expanded as allowed (7 facts, 10 actions, 2 states expanded)"]].assert_eq(&written(&stopped));
+        stopped with no plan yet: as many states were expanded as allowed (7 facts, 10 actions, 2 states expanded); the nearest state still lacked ana -front-> shelly"]].assert_eq(&written(&stopped));
     let mut cancelled = Limits::new().with_clock(1.0, || f64::INFINITY);
     let stopped = plan(&grammar, &snapshot, &goal, &options, &mut cancelled).unwrap();
     expect![[r"

@@ -45,6 +45,7 @@ pub(super) fn search(
         if let Err(reason) = limits.expand(states.bytes() + open.capacity() * size_of::<Entry>()) {
             return Found::Stopped(reason);
         }
+        limits.note(states.known(node).estimate, states.state(node));
         task.applicable(states.state(node), &mut applicable);
         for &action in &applicable {
             task.successor(states.state(node), action as usize, &mut next);

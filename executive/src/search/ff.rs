@@ -2,41 +2,82 @@
 //! by `h_add` (Hoffmann and Nebel 2001, Keyder and Geffner 2008), and the actions of it that can be
 //! applied at once. This file guarantees that a state it calls a dead end is one.
 
+use super::queue::Queue;
 use super::relaxed::{NO_ACTION, Proposition, Relaxed};
 use crate::task::{Micro, Task};
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 
-const UNREACHED: Micro = Micro::MAX;
+const UNREACHED: u32 = u32::MAX;
+
+/// How far the exploration has come with an operator.
+#[derive(Debug, Clone, Copy)]
+struct Progress {
+    missing: u32,
+    sum: u32,
+}
+
+/// What the exploration knows of a proposition.
+#[derive(Debug, Clone, Copy)]
+struct Reached {
+    distance: u32,
+    supporter: u32,
+}
 
 /// The heuristic, with its working memory.
 #[derive(Debug)]
 pub(super) struct Ff<'a> {
     task: &'a Task,
     relaxed: &'a Relaxed,
-    costs: Vec<Micro>,
-    distance: Vec<Micro>,
-    supporter: Vec<u32>,
-    missing: Vec<u32>,
-    sum: Vec<Micro>,
-    open: BinaryHeap<Reverse<(Micro, Proposition)>>,
+    /// Costs of actions, in the unit that they are all multiples of.
+    costs: Vec<u32>,
+    unit: Micro,
+    /// All operators before the exploration.
+    fresh: Vec<Progress>,
+    progress: Vec<Progress>,
+    reached: Vec<Reached>,
+    open: Queue,
     marked: Vec<bool>,
     /// Applicable actions of the last relaxed plan, ascending.
     pub(super) preferred: Vec<u32>,
 }
 
+fn greatest_common_divisor(mut a: Micro, mut b: Micro) -> Micro {
+    while b > 0 {
+        (a, b) = (b, a % b);
+    }
+    a
+}
+
 impl<'a> Ff<'a> {
     /// The heuristic under `costs` of actions.
-    pub(super) fn new(task: &'a Task, relaxed: &'a Relaxed, costs: Vec<Micro>) -> Self {
+    pub(super) fn new(task: &'a Task, relaxed: &'a Relaxed, costs: &[Micro]) -> Self {
+        let mut unit = costs
+            .iter()
+            .copied()
+            .fold(0, greatest_common_divisor)
+            .max(1);
+        let dearest = costs.iter().copied().max().unwrap_or_default();
+        // Sums stay far below the end of their numbers; it is an estimate.
+        unit = unit.max(dearest / 100_000);
+        let costs: Vec<u32> = costs.iter().map(|cost| (cost / unit) as u32).collect();
+        let operators = relaxed.operators.iter();
+        let fresh: Vec<Progress> = operators
+            .map(|operator| Progress {
+                missing: operator.needs.len() as u32,
+                sum: match operator.action {
+                    NO_ACTION => 0,
+                    action => costs[action as usize],
+                },
+            })
+            .collect();
         Self {
             task,
             relaxed,
             costs,
-            distance: vec![UNREACHED; relaxed.propositions],
-            supporter: vec![0; relaxed.propositions],
-            missing: vec![0; relaxed.operators.len()],
-            sum: vec![0; relaxed.operators.len()],
-            open: BinaryHeap::new(),
+            unit,
+            progress: fresh.clone(),
+            fresh,
+            reached: Vec::new(),
+            open: Queue::default(),
             marked: vec![false; relaxed.propositions],
             preferred: Vec::new(),
         }
@@ -46,7 +87,7 @@ impl<'a> Ff<'a> {
     pub(super) fn estimate(&mut self, state: &[u64]) -> Option<Micro> {
         self.explore(state);
         self.preferred.clear();
-        if self.distance[self.relaxed.goal as usize] == UNREACHED {
+        if self.reached[self.relaxed.goal as usize].distance == UNREACHED {
             return None;
         }
         Some(self.extract(state))
@@ -54,36 +95,41 @@ impl<'a> Ff<'a> {
 
     fn explore(&mut self, state: &[u64]) {
         let relaxed = self.relaxed;
-        self.distance.fill(UNREACHED);
-        for (index, operator) in relaxed.operators.iter().enumerate() {
-            self.missing[index] = operator.needs.len() as u32;
-            self.sum[index] = relaxed.cost(index, &self.costs);
-        }
+        let nothing = Reached {
+            distance: UNREACHED,
+            supporter: 0,
+        };
+        self.reached.clear();
+        self.reached.resize(relaxed.propositions, nothing);
+        self.progress.copy_from_slice(&self.fresh);
         self.open.clear();
         relaxed.each_holding(state, |proposition| {
-            self.distance[proposition as usize] = 0;
-            self.open.push(Reverse((0, proposition)));
+            self.reached[proposition as usize].distance = 0;
+            self.open.push(0, proposition);
         });
-        while let Some(Reverse((cost, proposition))) = self.open.pop() {
-            if cost > self.distance[proposition as usize] {
+        while let Some((cost, proposition)) = self.open.pop() {
+            if cost > self.reached[proposition as usize].distance {
                 continue;
             }
             if proposition == relaxed.goal {
                 break;
             }
-            for &operator in &relaxed.needed_by[proposition as usize] {
-                let index = operator as usize;
-                self.missing[index] -= 1;
-                self.sum[index] = self.sum[index].saturating_add(cost);
-                if self.missing[index] > 0 {
+            for &operator in relaxed.needed_by.of(proposition) {
+                let progress = &mut self.progress[operator as usize];
+                progress.missing -= 1;
+                progress.sum = progress.sum.saturating_add(cost);
+                if progress.missing > 0 {
                     continue;
                 }
-                let reached = self.sum[index];
-                for &add in &relaxed.operators[index].adds {
-                    if reached < self.distance[add as usize] {
-                        self.distance[add as usize] = reached;
-                        self.supporter[add as usize] = operator;
-                        self.open.push(Reverse((reached, add)));
+                let distance = progress.sum.min(UNREACHED - 1);
+                for &add in relaxed.adds.of(operator) {
+                    let known = &mut self.reached[add as usize];
+                    if distance < known.distance {
+                        *known = Reached {
+                            distance,
+                            supporter: operator,
+                        };
+                        self.open.push(distance, add);
                     }
                 }
             }
@@ -94,13 +140,14 @@ impl<'a> Ff<'a> {
         let relaxed = self.relaxed;
         self.marked.fill(false);
         let mut chosen = Vec::new();
-        let mut stack = vec![relaxed.goal];
+        let mut stack: Vec<Proposition> = vec![relaxed.goal];
         while let Some(proposition) = stack.pop() {
             let index = proposition as usize;
-            if std::mem::replace(&mut self.marked[index], true) || self.distance[index] == 0 {
+            if std::mem::replace(&mut self.marked[index], true) || self.reached[index].distance == 0
+            {
                 continue;
             }
-            let operator = &relaxed.operators[self.supporter[index] as usize];
+            let operator = &relaxed.operators[self.reached[index].supporter as usize];
             if operator.action != NO_ACTION {
                 chosen.push(operator.action);
             }
@@ -108,10 +155,12 @@ impl<'a> Ff<'a> {
         }
         chosen.sort_unstable();
         chosen.dedup();
-        let cost = chosen.iter().map(|&action| self.costs[action as usize]);
-        let total = cost.fold(0, Micro::saturating_add);
+        let costs = chosen
+            .iter()
+            .map(|&action| Micro::from(self.costs[action as usize]));
+        let total: Micro = costs.sum();
         chosen.retain(|&action| self.task.is_applicable(state, action as usize));
         self.preferred = chosen;
-        total
+        total.saturating_mul(self.unit)
     }
 }

@@ -4,11 +4,11 @@
 
 use super::StopReason;
 use super::ff::Ff;
+use super::landmarks::Landmarks;
 use super::limits::Limits;
 use super::states::{Known, NONE, Node, States};
 use crate::task::{Micro, State, Task};
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeMap, VecDeque};
 
 /// What a search came to.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -24,68 +24,100 @@ pub(super) enum Found {
 /// How many turns the queue of preferred actions gains when the search makes progress.
 const BOOST: i64 = 1000;
 
-/// A successor not yet computed: rank, order of arrival, parent, action.
-type Entry = Reverse<(Micro, u64, Node, u32)>;
+/// A successor not yet computed: parent and action.
+type Entry = (Node, u32);
 
+/// Queues of successors: for each of two estimates all of them, and those by preferred actions.
 #[derive(Debug)]
 struct Queues {
-    /// All successors, and those by preferred actions alone.
-    open: [BinaryHeap<Entry>; 2],
-    /// The queue with the lower one is next.
-    turns: [i64; 2],
-    arrivals: u64,
+    /// By rank; of equals the first comes first.
+    open: [BTreeMap<Micro, VecDeque<Entry>>; 4],
+    /// The queue with the lowest one is next; of equals the one with the highest number.
+    turns: [i64; 4],
+    entries: usize,
 }
 
 impl Queues {
     fn new() -> Self {
         Self {
-            open: [BinaryHeap::new(), BinaryHeap::new()],
-            turns: [0, 0],
-            arrivals: 0,
+            open: std::array::from_fn(|_| BTreeMap::new()),
+            turns: [0; 4],
+            entries: 0,
         }
     }
 
     fn bytes(&self) -> usize {
-        let capacity: usize = self.open.iter().map(BinaryHeap::capacity).sum();
-        capacity * size_of::<Entry>()
+        self.entries * size_of::<Entry>() * 3 / 2
     }
 
-    fn push(&mut self, rank: Micro, parent: Node, action: u32, preferred: bool) {
-        self.arrivals += 1;
-        let entry = Reverse((rank, self.arrivals, parent, action));
-        self.open[0].push(entry);
-        if preferred {
-            self.open[1].push(entry);
-        }
+    fn boost(&mut self) {
+        self.turns[1] -= BOOST;
+        self.turns[3] -= BOOST;
     }
 
-    fn pop(&mut self) -> Option<(Node, u32)> {
-        let first = usize::from(self.turns[1] <= self.turns[0]);
-        for queue in [first, 1 - first] {
-            if let Some(Reverse((_, _, parent, action))) = self.open[queue].pop() {
-                self.turns[queue] += 1;
-                return Some((parent, action));
+    /// Adds the successors of a node by some actions, of which some are preferred.
+    fn push(&mut self, ranks: [Option<Micro>; 2], node: Node, actions: &[u32], preferred: &[u32]) {
+        for (which, rank) in ranks.into_iter().enumerate() {
+            let Some(rank) = rank else { continue };
+            for (queue, actions) in [(2 * which, actions), (2 * which + 1, preferred)] {
+                if !actions.is_empty() {
+                    let bucket = self.open[queue].entry(rank).or_default();
+                    bucket.extend(actions.iter().map(|&action| (node, action)));
+                    self.entries += actions.len();
+                }
             }
         }
-        None
+    }
+
+    fn pop(&mut self) -> Option<Entry> {
+        let filled = (0..4).rev().filter(|&queue| !self.open[queue].is_empty());
+        let next = filled.min_by_key(|&queue| self.turns[queue])?;
+        self.turns[next] += 1;
+        self.entries -= 1;
+        let mut bucket = self.open[next].first_entry()?;
+        let entry = bucket.get_mut().pop_front();
+        if bucket.get().is_empty() {
+            bucket.remove();
+        }
+        entry
     }
 }
 
-/// Searches a plan that costs less than `bound`. States are ranked by the estimate alone, or by
-/// the cost so far plus `weight` times the estimate.
+/// How a search ranks states.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ranking {
+    /// By the estimate alone, or by the cost so far plus so many times the estimate.
+    pub(super) weight: Option<u64>,
+    /// What a landmark counts beside costs.
+    pub(super) unit: Micro,
+    /// A plan must cost less.
+    pub(super) bound: Micro,
+}
+
+/// Searches a plan that costs less than the ranking's bound.
 pub(super) fn search(
     task: &Task,
     heuristic: &mut Ff<'_>,
-    weight: Option<u64>,
-    bound: Micro,
+    landmarks: &Landmarks,
+    ranking: Ranking,
     limits: &mut Limits<'_>,
 ) -> Found {
+    let Ranking {
+        weight,
+        unit,
+        bound,
+    } = ranking;
+    // Without a bound, any way to a state is as good as another.
+    let reopens = weight.is_some() || bound != Micro::MAX;
     let mut states = States::new(task.words());
     let mut queues = Queues::new();
-    let mut best = Micro::MAX;
+    let mut best = [Micro::MAX; 2];
     let mut applicable = Vec::new();
     let mut next = State::new();
     let mut from = (NONE, 0);
+    // The landmarks accepted on the way to each node.
+    let words = landmarks.words();
+    let mut accepted: Vec<u64> = Vec::new();
     next.extend_from_slice(task.initial());
     loop {
         // Enter the state in `next`, reached by `from`.
@@ -105,8 +137,18 @@ pub(super) fn search(
             None
         } else {
             match states.find(&next) {
-                None => Some((states.insert(&next, way), true)),
-                Some(node) if cost < states.known(node).cost => {
+                None => {
+                    if parent == NONE {
+                        accepted.resize(words, 0);
+                    } else {
+                        let before = parent as usize * words;
+                        accepted.extend_from_within(before..before + words);
+                    }
+                    let node = states.insert(&next, way);
+                    landmarks.accept(&next, &mut accepted[node as usize * words..]);
+                    Some((node, true))
+                }
+                Some(node) if reopens && cost < states.known(node).cost => {
                     let estimate = states.known(node).estimate;
                     *states.known_mut(node) = Known { estimate, ..way };
                     // Nothing leads on from a dead end, whatever the way to it costs.
@@ -119,27 +161,41 @@ pub(super) fn search(
             if task.is_goal(&next) {
                 return Found::Plan(states.way_to(node));
             }
-            if let Err(reason) = limits.expand(states.bytes() + queues.bytes()) {
+            let bytes = states.bytes() + queues.bytes() + accepted.capacity() * 8;
+            if let Err(reason) = limits.expand(bytes) {
                 return Found::Stopped(reason);
             }
             // A better way to a known state costs one more estimate, for its preferred actions.
             if let Some(estimate) = heuristic.estimate(&next) {
                 states.known_mut(node).estimate = estimate;
-                if new && estimate < best {
-                    best = estimate;
-                    queues.turns[1] -= BOOST;
+                limits.note(estimate, &next);
+                let mut estimates = [Some(estimate), None];
+                if words > 0 {
+                    let own = &accepted[node as usize * words..][..words];
+                    estimates[1] = Some(landmarks.count(&next, own).saturating_mul(unit));
                 }
-                let rank = match weight {
-                    None => estimate,
-                    Some(weight) => cost.saturating_add(weight.saturating_mul(estimate)),
-                };
-                task.applicable(&next, &mut applicable);
-                for &action in &applicable {
-                    if task.cost_after(cost, action as usize) < bound {
-                        let preferred = heuristic.preferred.binary_search(&action).is_ok();
-                        queues.push(rank, node, action, preferred);
+                for (estimate, best) in estimates.iter().zip(&mut best) {
+                    if let Some(estimate) = estimate
+                        && new
+                        && estimate < best
+                    {
+                        *best = *estimate;
+                        queues.boost();
                     }
                 }
+                let ranks = estimates.map(|estimate| {
+                    Some(match weight {
+                        None => estimate?,
+                        Some(weight) => cost.saturating_add(weight.saturating_mul(estimate?)),
+                    })
+                });
+                task.applicable(&next, &mut applicable);
+                if bound != Micro::MAX {
+                    let below = |&action: &u32| task.cost_after(cost, action as usize) < bound;
+                    applicable.retain(below);
+                    heuristic.preferred.retain(below);
+                }
+                queues.push(ranks, node, &applicable, &heuristic.preferred);
             }
         }
         // Take the next successor.

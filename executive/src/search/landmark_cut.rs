@@ -108,7 +108,7 @@ impl<'a> LandmarkCut<'a> {
             if cost > self.distance[proposition as usize] {
                 continue;
             }
-            for &operator in &relaxed.needed_by[proposition as usize] {
+            for &operator in relaxed.needed_by.of(proposition) {
                 let index = operator as usize;
                 self.missing[index] -= 1;
                 if self.missing[index] == 0 {
@@ -136,7 +136,7 @@ impl<'a> LandmarkCut<'a> {
             if cost > self.distance[proposition as usize] {
                 continue;
             }
-            for &operator in &relaxed.needed_by[proposition as usize] {
+            for &operator in relaxed.needed_by.of(proposition) {
                 let index = operator as usize;
                 if self.missing[index] > 0 || self.supporter[index] != proposition {
                     continue;
@@ -161,7 +161,7 @@ impl<'a> LandmarkCut<'a> {
                 continue;
             }
             self.zone[proposition as usize] = Zone::Goal;
-            for &operator in &relaxed.added_by[proposition as usize] {
+            for &operator in relaxed.added_by.of(proposition) {
                 let index = operator as usize;
                 if self.missing[index] == 0 && relaxed.cost(index, &self.rest) == 0 {
                     stack.push(self.supporter[index]);
@@ -182,7 +182,7 @@ impl<'a> LandmarkCut<'a> {
         });
         let mut cut = Vec::new();
         while let Some(proposition) = stack.pop() {
-            for &operator in &relaxed.needed_by[proposition as usize] {
+            for &operator in relaxed.needed_by.of(proposition) {
                 let index = operator as usize;
                 if self.missing[index] > 0 || self.supporter[index] != proposition {
                     continue;

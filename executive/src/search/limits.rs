@@ -1,6 +1,7 @@
 //! When a search must stop. This file guarantees that without a clock the limits depend on the
 //! work done alone, so that the same task stops at the same place everywhere.
 
+use crate::task::{Micro, State};
 use std::fmt;
 
 /// Reads the seconds since the search began; see [`Limits::with_clock`].
@@ -20,6 +21,10 @@ pub struct Limits<'a> {
     seconds: f64,
     clock: Option<Box<Clock<'a>>>,
     expanded: u64,
+    /// Where the expansions of a part of the search end.
+    cap: u64,
+    /// The state with the least estimate so far, and that estimate.
+    nearest: Option<(Micro, State)>,
 }
 
 impl fmt::Debug for Limits<'_> {
@@ -69,6 +74,8 @@ impl<'a> Limits<'a> {
             seconds: f64::INFINITY,
             clock: None,
             expanded: 0,
+            cap: u64::MAX,
+            nearest: None,
         }
     }
 
@@ -100,6 +107,36 @@ impl<'a> Limits<'a> {
         self.expanded
     }
 
+    /// Notes an estimate of how far a state is from the goal.
+    pub(crate) fn note(&mut self, estimate: Micro, state: &[u64]) {
+        if self
+            .nearest
+            .as_ref()
+            .is_none_or(|(least, _)| estimate < *least)
+        {
+            self.nearest = Some((estimate, state.to_vec()));
+        }
+    }
+
+    /// The state that was noted to be nearest to the goal.
+    pub(crate) fn nearest(&self) -> Option<&[u64]> {
+        self.nearest.as_ref().map(|(_, state)| state.as_slice())
+    }
+
+    /// Forgets what was noted of another task.
+    pub(crate) fn forget_nearest(&mut self) {
+        self.nearest = None;
+    }
+
+    /// Allows so many expansions more, until [`Self::uncap`].
+    pub(crate) fn cap(&mut self, more: u64) {
+        self.cap = self.expanded.saturating_add(more);
+    }
+
+    pub(crate) fn uncap(&mut self) {
+        self.cap = u64::MAX;
+    }
+
     /// Whether the time is over.
     ///
     /// # Errors
@@ -129,7 +166,7 @@ impl<'a> Limits<'a> {
     /// # Errors
     /// The limit that does not allow it.
     pub(crate) fn expand(&mut self, bytes: usize) -> Result<(), StopReason> {
-        if self.expanded >= self.expansions {
+        if self.expanded >= self.expansions.min(self.cap) {
             return Err(StopReason::Expansions);
         }
         if bytes > self.bytes {

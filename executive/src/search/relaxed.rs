@@ -24,6 +24,30 @@ pub(super) struct Operator {
     pub(super) action: u32,
 }
 
+/// Lists one behind another, each found by its number.
+#[derive(Debug, Clone)]
+pub(super) struct Lists {
+    starts: Vec<u32>,
+    items: Vec<u32>,
+}
+
+impl Lists {
+    fn new<'a>(lists: impl Iterator<Item = &'a Vec<u32>>) -> Self {
+        let (mut starts, mut items) = (vec![0], Vec::new());
+        for list in lists {
+            items.extend_from_slice(list);
+            starts.push(items.len() as u32);
+        }
+        Self { starts, items }
+    }
+
+    /// The list of a number.
+    pub(super) fn of(&self, number: u32) -> &[u32] {
+        let number = number as usize;
+        &self.items[self.starts[number] as usize..self.starts[number + 1] as usize]
+    }
+}
+
 /// A task without deletes.
 #[derive(Debug, Clone)]
 pub(super) struct Relaxed {
@@ -31,11 +55,14 @@ pub(super) struct Relaxed {
     pub(super) operators: Vec<Operator>,
     pub(super) goal: Proposition,
     /// Operators that need a proposition.
-    pub(super) needed_by: Vec<Vec<u32>>,
+    pub(super) needed_by: Lists,
     /// Operators that add a proposition.
-    pub(super) added_by: Vec<Vec<u32>>,
+    pub(super) added_by: Lists,
+    /// Propositions that an operator adds, as in `operators`.
+    pub(super) adds: Lists,
     /// The literal of each proposition that stands for one.
     literals: Vec<(Literal, Proposition)>,
+    literal_of: Vec<Option<Literal>>,
 }
 
 struct Builder<'a> {
@@ -152,27 +179,39 @@ impl Relaxed {
         let mut relaxed = Self {
             propositions,
             goal,
-            needed_by: vec![Vec::new(); propositions],
-            added_by: vec![Vec::new(); propositions],
+            needed_by: Lists::new([].iter()),
+            added_by: Lists::new([].iter()),
+            adds: Lists::new(builder.operators.iter().map(|operator| &operator.adds)),
             literals: Vec::new(),
+            literal_of: vec![None; propositions],
             operators: builder.operators,
         };
         for fact in 0..task.facts() as u32 {
             for literal in [Literal::positive(fact), Literal::negative(fact)] {
                 if let Some(proposition) = builder.literals[literal.index()] {
                     relaxed.literals.push((literal, proposition));
+                    relaxed.literal_of[proposition as usize] = Some(literal);
                 }
             }
         }
+        let mut needed_by = vec![Vec::new(); propositions];
+        let mut added_by = vec![Vec::new(); propositions];
         for (index, operator) in (0..).zip(&relaxed.operators) {
             for &need in &operator.needs {
-                relaxed.needed_by[need as usize].push(index);
+                needed_by[need as usize].push(index);
             }
             for &add in &operator.adds {
-                relaxed.added_by[add as usize].push(index);
+                added_by[add as usize].push(index);
             }
         }
+        relaxed.needed_by = Lists::new(needed_by.iter());
+        relaxed.added_by = Lists::new(added_by.iter());
         relaxed
+    }
+
+    /// The literal that a proposition stands for; others stand for disjunctions or the goal.
+    pub(super) fn literal(&self, proposition: Proposition) -> Option<Literal> {
+        self.literal_of[proposition as usize]
     }
 
     /// Calls `visit` with each proposition that holds in `state`.
@@ -204,7 +243,7 @@ impl Relaxed {
         });
         let mut missing: Vec<usize> = self.operators.iter().map(|o| o.needs.len()).collect();
         while let Some(proposition) = open.pop() {
-            for &operator in &self.needed_by[proposition as usize] {
+            for &operator in self.needed_by.of(proposition) {
                 let operator = operator as usize;
                 missing[operator] -= 1;
                 if missing[operator] == 0 {

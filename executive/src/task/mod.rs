@@ -4,10 +4,12 @@
 //! [`Task::successor`]. It knows nothing of graphs and rules.
 
 mod formula;
+mod relevance;
 
 pub use formula::{Formula, Literal};
 
 pub(crate) use formula::conjuncts;
+pub(crate) use relevance::{keep, relevant};
 
 /// A proposition of a task, by number.
 pub type Fact = u32;

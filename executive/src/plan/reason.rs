@@ -1,0 +1,123 @@
+//! Why there is no plan, in words. This file guarantees that what it calls unreachable is, and that
+//! a search which was stopped is not taken for one that failed.
+
+use super::Options;
+use crate::ground::{Ground, Operator, Problem, Reached};
+use crate::search::{Limits, Reachability, StopReason};
+use crate::task::{Formula, Literal};
+
+/// So many literals are told.
+const MOST: usize = 4;
+
+/// How far a search came before it was stopped.
+pub(super) fn how_far(
+    problem: &Problem,
+    ground: &Ground,
+    stop: StopReason,
+    limits: &Limits<'_>,
+) -> String {
+    let mut reason = format!(
+        "stopped with no plan yet: {stop} ({} facts, {} actions, {} states expanded)",
+        ground.task.facts(),
+        ground.task.actions().len(),
+        limits.expanded()
+    );
+    let Some(nearest) = limits.nearest() else {
+        return reason;
+    };
+    let mut missing = Vec::new();
+    lacking(ground.task.goal(), nearest, &mut missing);
+    let words = missing.into_iter().filter_map(|literal| {
+        let atom = problem.atom(ground.atoms[literal.fact() as usize])?;
+        Some(if literal.negated() {
+            format!("without {atom}")
+        } else {
+            atom
+        })
+    });
+    let words: Vec<String> = words.take(MOST).collect();
+    if !words.is_empty() {
+        reason.push_str("; the nearest state still lacked ");
+        reason.push_str(&words.join(", "));
+    }
+    reason
+}
+
+/// The literals that keep a formula from holding; of a choice, those of the part that lacks least.
+fn lacking(formula: &Formula, state: &[u64], missing: &mut Vec<Literal>) {
+    match formula {
+        Formula::Literal(literal) => {
+            if !literal.holds(state) && !missing.contains(literal) {
+                missing.push(*literal);
+            }
+        }
+        Formula::And(parts) => parts.iter().for_each(|part| lacking(part, state, missing)),
+        Formula::Or(parts) => {
+            let alone = parts.iter().map(|part| {
+                let mut own = Vec::new();
+                lacking(part, state, &mut own);
+                own
+            });
+            if let Some(least) = alone.min_by_key(Vec::len) {
+                missing.extend(least);
+            }
+        }
+    }
+}
+
+pub(super) fn why_unsolvable(
+    problem: &Problem,
+    options: &Options,
+    spares: Option<usize>,
+    reached: &Reached,
+    ground: &Ground,
+    expanded: u64,
+) -> String {
+    let mut reasons = problem.unreachable(reached);
+    if reasons.is_empty() && !Reachability::new(&ground.task).goal {
+        reasons.extend(unreachable_literals(problem, ground));
+    }
+    if reasons.is_empty() {
+        reasons.push(if reached.goals.is_empty() {
+            "no choice of nodes fits all of the goal at once".to_owned()
+        } else if !Reachability::new(&ground.task).goal {
+            "no rule brings about what the goal's condition asks for".to_owned()
+        } else {
+            format!("no order of steps works: all {expanded} states that matter were tried")
+        });
+    }
+    if options.raised.iter().any(|raised| raised.by.is_infinite()) {
+        reasons.push("steps that failed lately were left out".to_owned());
+    }
+    if let Some(spares) = spares
+        && problem.program.operators.iter().any(Operator::creates)
+    {
+        reasons.push(format!("each rule was given {spares} new nodes at most"));
+    }
+    if reached.truncated {
+        reasons.push("attributes were followed through their first values only".to_owned());
+    }
+    reasons.extend(problem.program.notes.iter().cloned());
+    reasons.extend(ground.notes.iter().cloned());
+    reasons.join("; ")
+}
+
+/// The literals of the goal that even the relaxed task cannot reach.
+fn unreachable_literals(problem: &Problem, ground: &Ground) -> Vec<String> {
+    let reachability = Reachability::new(&ground.task);
+    let mut missing: Vec<Literal> = Vec::new();
+    ground.task.goal().each_literal(&mut |literal| {
+        if !reachability.literal(literal) && !missing.contains(&literal) {
+            missing.push(literal);
+        }
+    });
+    let words = missing.into_iter().filter_map(|literal| {
+        let atom = problem.atom(ground.atoms[literal.fact() as usize])?;
+        Some(if literal.negated() {
+            format!("{atom} holds, and nothing takes it away")
+        } else {
+            format!("{atom} cannot be reached")
+        })
+    });
+    words.take(MOST).collect()
+}
