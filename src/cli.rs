@@ -41,7 +41,8 @@ pub(crate) enum Verb {
     /// Find the steps that lead from a world to a goal
     #[command(
         after_help = "Without --optimal and --time-limit it prints the first plan it finds.\n\n\
-        Example:\n  cortex plan rules.aggl world.json goal.aggt --optimal"
+        Examples:\n  cortex plan rules.aggl world.json goal.aggt --optimal\n  \
+        cortex plan --pddl domain.pddl problem.pddl --plan-file plan"
     )]
     Plan(Plan),
     /// Submit, list, show, pause, resume and cancel the missions of a running instance
@@ -49,6 +50,9 @@ pub(crate) enum Verb {
         after_help = "Example:\n  cortex mission submit fetch.aggt --priority 2 --deadline 120"
     )]
     Mission(Mission),
+    /// Measure how fast it is here
+    #[command(after_help = "Example:\n  cortex bench plan --json")]
+    Bench(Bench),
     /// Find the cheapest path over a grid map, or check a list of known ones
     #[command(
         after_help = "Cells are X,Y from the upper left; costs and lengths are in cells.\n\n\
@@ -330,11 +334,22 @@ fn binding(text: &str) -> Result<(String, String), String> {
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Plan {
     /// A grammar (.aggl)
-    pub(crate) domain: PathBuf,
+    #[arg(required_unless_present = "pddl")]
+    pub(crate) domain: Option<PathBuf>,
     /// A world: graph JSON, RoboComp DSR JSON or AGM model XML
-    pub(crate) world: PathBuf,
+    #[arg(required_unless_present = "pddl")]
+    pub(crate) world: Option<PathBuf>,
     /// A goal (.aggt)
-    pub(crate) goal: PathBuf,
+    #[arg(required_unless_present = "pddl")]
+    pub(crate) goal: Option<PathBuf>,
+    /// Plan for a domain and a problem in PDDL instead
+    #[arg(
+        long,
+        num_args = 2,
+        value_names = ["DOMAIN", "PROBLEM"],
+        conflicts_with_all = ["domain", "write_pddl"]
+    )]
+    pub(crate) pddl: Option<Vec<PathBuf>>,
     /// A plan of least cost, or the proof that there is none
     #[arg(long)]
     pub(crate) optimal: bool,
@@ -344,6 +359,15 @@ pub(crate) struct Plan {
     /// Stop before the search takes more memory than this
     #[arg(long, value_name = "MB", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) memory_limit: u32,
+    /// How often each rule that creates nodes may be used
+    #[arg(long, value_name = "N", default_value_t = 3, conflicts_with = "pddl")]
+    pub(crate) spares: u16,
+    /// Write domain.pddl and problem.pddl into this folder, for other planners
+    #[arg(long, value_name = "DIR")]
+    pub(crate) write_pddl: Option<PathBuf>,
+    /// Write the plan as the planning competitions do, for validators
+    #[arg(long = "plan-file", value_name = "F")]
+    pub(crate) output: Option<PathBuf>,
     /// For machines
     #[arg(long)]
     pub(crate) json: bool,
@@ -356,4 +380,24 @@ fn seconds(text: &str) -> Result<f64, String> {
     } else {
         Err("the time must be more than 0 seconds".to_owned())
     }
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Bench {
+    #[command(subcommand)]
+    pub(crate) action: BenchAction,
+    /// For machines
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Clone, Subcommand)]
+pub(crate) enum BenchAction {
+    /// The planner: from the text of rules, world and goal to the plan
+    #[command(after_help = "Takes a few seconds.\n\nExample:\n  cortex bench plan --tasks tasks")]
+    Plan {
+        /// Write the tasks into this folder, for other planners
+        #[arg(long, value_name = "DIR")]
+        tasks: Option<PathBuf>,
+    },
 }

@@ -11,6 +11,7 @@
 mod ground;
 mod mission;
 mod monitor;
+pub mod pddl;
 mod plan;
 pub mod process;
 mod search;

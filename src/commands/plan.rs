@@ -1,43 +1,49 @@
 //! `cortex plan`: the steps that lead from a world to a goal, or why there are none.
 
 use super::graph::read_graph;
-use super::output::{print, print_json};
+use super::output::{print, print_json, tell};
 use crate::cli::Plan as Arguments;
 use crate::{Answer, Failure};
+use executive::pddl::{self, WriteError, Written};
 use executive::{Effort, Limits, Options, Outcome, Status, plan};
+use grammar::SourceFile;
 use serde_json::json;
 use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
-    let grammar = super::load_grammar(&super::read_text(&arguments.domain)?, &arguments.domain)?;
-    let goal = super::read_text(&arguments.goal)?;
-    let name = arguments.goal.display().to_string();
-    let goal = grammar::parse_goal(&goal, &name, &grammar.types)
-        .map_err(|defects| Failure::Input(defects.into()))?;
-    let graph = read_graph(&arguments.world)?;
-    let effort = match (arguments.optimal, arguments.time_limit) {
-        (true, _) => Effort::Optimal,
-        (false, Some(_)) => Effort::Anytime,
-        (false, None) => Effort::First,
-    };
-    let options = Options {
-        effort,
-        ..Options::default()
-    };
-    let bytes = (arguments.memory_limit as usize).saturating_mul(1_000_000);
     #[allow(
         clippy::disallowed_methods,
         reason = "the verb tells how long planning took"
     )]
     let started = Instant::now();
-    let mut limits = Limits::new().with_bytes(bytes);
-    if let Some(seconds) = arguments.time_limit {
-        limits = limits.with_clock(seconds, move || started.elapsed().as_secs_f64());
-    }
-    let outcome = plan(&grammar, &graph.snapshot(), &goal, &options, &mut limits);
-    let outcome = outcome.map_err(Failure::internal)?;
+    let mut limits = Limits::new().with_bytes(arguments.memory_limit as usize * 1_000_000);
+    let seconds = arguments.time_limit.unwrap_or(f64::INFINITY);
+    limits = limits.with_clock(seconds, move || started.elapsed().as_secs_f64());
+    let effort = match (arguments.optimal, arguments.time_limit) {
+        (true, _) => Effort::Optimal,
+        (false, Some(_)) => Effort::Anytime,
+        (false, None) => Effort::First,
+    };
+    let (outcome, names) = match arguments.pddl.as_deref() {
+        Some([domain, problem]) => {
+            let read = |path: &PathBuf| {
+                let text = super::read_text(path)?;
+                Ok::<_, Failure>(SourceFile::new(&path.display().to_string(), &text))
+            };
+            let definition = pddl::read(&read(domain)?, &read(problem)?)
+                .map_err(|defects| Failure::Input(defects.into()))?;
+            (pddl::plan(&definition, effort, &mut limits), None)
+        }
+        _ => by_rules(arguments, effort, &mut limits)?,
+    };
     let seconds = started.elapsed().as_secs_f64();
+    if let Some(file) = &arguments.output
+        && outcome.status == Status::Solved
+    {
+        write_file(file, &pddl::plan_file(&outcome, names.as_ref()))?;
+    }
     if arguments.json {
         let mut answer = json!(outcome);
         answer["seconds"] = json!(seconds);
@@ -50,6 +56,56 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     } else {
         Answer::No
     })
+}
+
+/// Plans over the rules of a grammar, and writes what was asked in PDDL where that is wanted.
+fn by_rules(
+    arguments: &Arguments,
+    effort: Effort,
+    limits: &mut Limits<'_>,
+) -> Result<(Outcome, Option<Written>), Failure> {
+    let (Some(domain), Some(world), Some(goal)) =
+        (&arguments.domain, &arguments.world, &arguments.goal)
+    else {
+        return Err(Failure::input("a grammar, a world and a goal are needed"));
+    };
+    let grammar = super::load_grammar(&super::read_text(domain)?, domain)?;
+    let name = goal.display().to_string();
+    let goal = grammar::parse_goal(&super::read_text(goal)?, &name, &grammar.types)
+        .map_err(|defects| Failure::Input(defects.into()))?;
+    let graph = read_graph(world)?;
+    let snapshot = graph.snapshot();
+    let options = Options {
+        effort,
+        spares: arguments.spares.into(),
+        ..Options::default()
+    };
+    let mut written = None;
+    if arguments.write_pddl.is_some() || arguments.output.is_some() {
+        written = match pddl::write(&grammar, &snapshot, &goal, &options, limits) {
+            Ok(written) => Some(written),
+            // Planning says the same of these.
+            Err(WriteError::Goal(_) | WriteError::Stopped(_)) => None,
+            Err(WriteError::Read(error)) => return Err(Failure::internal(error)),
+        };
+    }
+    if let (Some(folder), Some(written)) = (&arguments.write_pddl, &written) {
+        std::fs::create_dir_all(folder).map_err(|error| {
+            Failure::input(format!("cannot make {}: {error}", folder.display()))
+        })?;
+        write_file(&folder.join("domain.pddl"), &written.domain)?;
+        write_file(&folder.join("problem.pddl"), &written.problem)?;
+        for note in &written.notes {
+            tell(&format!("{note}\n"));
+        }
+    }
+    let outcome = plan(&grammar, &snapshot, &goal, &options, limits).map_err(Failure::internal)?;
+    Ok((outcome, written))
+}
+
+fn write_file(path: &Path, text: &str) -> Result<(), Failure> {
+    std::fs::write(path, text)
+        .map_err(|error| Failure::input(format!("cannot write {}: {error}", path.display())))
 }
 
 /// The outcome for people.

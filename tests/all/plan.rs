@@ -177,3 +177,75 @@ fn broken_input_is_told_with_its_place() {
     let (code, _, err) = plan(RULES, &world, goal, &["--time-limit", "0"]);
     assert!(code == 2 && err.contains("--time-limit"), "{err}");
 }
+
+const LIFT: &str = "(define (domain lift) (:requirements :strips :typing :action-costs)
+  (:types floor) (:predicates (at ?f - floor) (above ?a ?b - floor))
+  (:functions (total-cost) - number)
+  (:action up :parameters (?a ?b - floor) :precondition (and (at ?a) (above ?a ?b))
+    :effect (and (not (at ?a)) (at ?b) (increase (total-cost) 2))))";
+
+#[test]
+fn tasks_in_pddl_are_planned_for_and_plans_written_for_validators() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let problem = "(define (problem p) (:domain lift) (:objects a b c - floor)
+      (:init (at a) (above a b) (above b c)) (:goal (at c)) (:metric minimize (total-cost)))";
+    fs::write(path("lift.pddl"), LIFT).unwrap();
+    fs::write(path("p.pddl"), problem).unwrap();
+    fs::write(path("bad.pddl"), problem.replace("(at c)", "(att c)")).unwrap();
+    let (lift, plan_file) = (path("lift.pddl"), path("plan"));
+    let run = |problem: &str| {
+        let problem = path(problem);
+        let flags = ["--optimal", "--json", "--plan-file", &plan_file];
+        Program::run(&[&["plan", "--pddl", &lift, &problem][..], &flags].concat())
+    };
+    let output = run("p.pddl");
+    assert_eq!(output.status.code(), Some(0));
+    let plan: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(
+        (&plan["cost"], &plan["optimal"]),
+        (&json!(4.0), &json!(true))
+    );
+    assert_eq!(plan["steps"][1]["binding"], json!({"a": "b", "b": "c"}));
+    let written = fs::read_to_string(&plan_file).unwrap();
+    assert_eq!(written, "(up a b)\n(up b c)\n; cost = 4 (general cost)\n");
+    let output = run("bad.pddl");
+    assert_eq!(output.status.code(), Some(2));
+    let words = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        words.contains("bad.pddl:2") && words.contains("did you mean `at`?"),
+        "{words}"
+    );
+}
+
+#[test]
+fn what_is_written_in_pddl_has_the_same_best_plan() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (texts, plan_file) = (path("pddl"), path("plan"));
+    let flags = [
+        "--optimal",
+        "--write-pddl",
+        &texts,
+        "--plan-file",
+        &plan_file,
+    ];
+    let goal = "{ r:robot \"room4\":room r->\"room4\"(in) }";
+    let (code, planned) = json(RULES, &row(3, true), goal, &flags);
+    assert_eq!(code, 0, "{planned}");
+    let [domain, problem] = ["domain", "problem"].map(|name| path(&format!("pddl/{name}.pddl")));
+    let output = Program::run(&["plan", "--pddl", &domain, &problem, "--optimal", "--json"]);
+    let again: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(
+        (&again["status"], &again["cost"]),
+        (&json!("solved"), &planned["cost"])
+    );
+    let rules: Vec<String> = again["steps"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|step| format!("({})", step["rule"].as_str().unwrap()))
+        .collect();
+    let written = fs::read_to_string(&plan_file).unwrap();
+    assert_eq!(written.lines().take(rules.len()).collect::<Vec<_>>(), rules);
+}
