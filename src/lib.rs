@@ -3,6 +3,7 @@
 //! Exit codes: 0 done, 1 the answer is no, 2 bad input, 3 something is broken.
 #![forbid(unsafe_code)]
 
+mod bench;
 mod cli;
 mod commands;
 mod conduct;

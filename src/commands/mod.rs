@@ -1,6 +1,7 @@
 //! The verbs: each reads its input, calls the packages, and prints what came of it.
 
 mod agent;
+mod bench;
 mod graph;
 mod mission;
 mod output;
@@ -31,6 +32,7 @@ pub(crate) fn perform(verb: Verb) -> Result<Answer, Failure> {
         Verb::Rules(arguments) => rules::run(&arguments),
         Verb::Plan(arguments) => plan::run(&arguments),
         Verb::Mission(arguments) => mission::run(&arguments),
+        Verb::Bench(arguments) => bench::run(&arguments),
         Verb::Path(arguments) => path::run(&arguments),
     }
 }
