@@ -35,8 +35,8 @@ pub use schema::{
     AttributeType, Label, NameKind, NodeType, Schema, SchemaError, SchemaFileError, suggest,
 };
 pub use shm::{
-    AttachError, Changes, ClockError, CommitError, Instance, InstanceError, Publisher, Session,
-    Store, StoreError, Subscriber, Tick, Update,
+    AttachError, BareClient, BareServer, Changes, ClockError, CommitError, Instance, InstanceError,
+    Publisher, Session, Store, StoreError, Subscriber, Tick, Update,
 };
 pub use snapshot::{
     Attribute, Edge, Edges, Element, Neighbors, Node, NodeIds, Snapshot, TransformError,

@@ -149,22 +149,23 @@ impl Snapshot {
         self.arena.broken(self.root.version, address)
     }
 
+    #[inline]
     fn node_at(&self, address: Address) -> Result<Node<'_>, ReadError> {
-        let read = || {
-            let words = self.arena.from(address)?;
-            Some((
-                NodeId(words.first()?.load()),
-                TypeId(words.get(1)?.load() as u16),
-            ))
+        let words = self.arena.from(address);
+        let record = words.and_then(|words| words.first_chunk::<{ record::NODE_HEADER }>());
+        let (Some([id, kind, ..]), Some(words)) = (record, words) else {
+            return Err(self.arena.broken(self.root.version, address));
         };
-        let (id, type_id) = self.genuine(read().ok_or(address))?;
-        Ok(Node::at(self, address, id, type_id))
+        let (id, type_id) = (NodeId(id.load()), TypeId(kind.load() as u16));
+        self.check()?;
+        Ok(Node::at(self, address, words, id, type_id))
     }
 
     /// The node of that id, if it is there.
     ///
     /// # Errors
     /// [`ReadError`], as for every read of a snapshot.
+    #[inline]
     pub fn find_node(&self, id: NodeId) -> Result<Option<Node<'_>>, ReadError> {
         self.genuine(trie::find(&self.arena, self.root.nodes, id.0))?
             .map(|address| self.node_at(address))
@@ -178,7 +179,7 @@ impl Snapshot {
     pub fn find_node_by_name(&self, name: &str) -> Result<Option<Node<'_>>, ReadError> {
         let hash = hash(name);
         let mut range = self.range(self.root.names, [hash, 0], [hash, u64::MAX])?;
-        while let Some((key, _)) = self.genuine(range.next(&self.arena))? {
+        while let Some((key, _)) = self.genuine(range.next())? {
             if let Some(node) = self.find_node(NodeId(key[1]))?
                 && node.name()? == name
             {
@@ -188,7 +189,7 @@ impl Snapshot {
         Ok(None)
     }
 
-    fn range(&self, root: Address, from: Key, to: Key) -> Result<tree::Range, ReadError> {
+    fn range(&self, root: Address, from: Key, to: Key) -> Result<tree::Range<'_>, ReadError> {
         self.genuine(tree::Range::new(&self.arena, root, from, to))
     }
 
@@ -405,7 +406,7 @@ impl Iterator for NodeIds<'_> {
 #[derive(Debug)]
 struct Scan<'a> {
     snapshot: &'a Snapshot,
-    range: Option<Result<tree::Range, ReadError>>,
+    range: Option<Result<tree::Range<'a>, ReadError>>,
 }
 
 impl Iterator for Scan<'_> {
@@ -413,7 +414,7 @@ impl Iterator for Scan<'_> {
 
     fn next(&mut self) -> Option<Self::Item> {
         let next = match self.range.as_mut()? {
-            Ok(range) => self.snapshot.genuine(range.next(&self.snapshot.arena)),
+            Ok(range) => self.snapshot.genuine(range.next()),
             Err(error) => Err(*error),
         };
         if !matches!(next, Ok(Some(_))) {

@@ -3,6 +3,7 @@
 //! reach it were declared unreadable.
 
 use super::{Address, Arena, FIRST_BLOCK, Word};
+use crate::shm::Segment;
 use rustc_hash::FxHashSet;
 use std::collections::VecDeque;
 
@@ -37,10 +38,8 @@ impl Growth for HeapGrowth {
         if index >= arena.capacity() {
             return Err(Full);
         }
-        let words: Box<[Word]> = (0..arena.segment_words())
-            .map(|_| Word::default())
-            .collect();
-        arena.attach(index, Box::new(words));
+        let words = (0..arena.segment_words()).map(|_| Word::default());
+        arena.attach(index, Segment::on_heap(words.collect()));
         Ok(())
     }
     fn reserve(&mut self, _: usize, _: usize, _: usize) -> Result<(), Full> {

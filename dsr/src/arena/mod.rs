@@ -10,9 +10,11 @@
 
 pub(crate) mod allocator;
 pub(crate) mod record;
+pub(crate) mod table;
 pub(crate) mod tree;
 pub(crate) mod trie;
 
+use crate::shm::Segment;
 use crate::{Epoch, Time, Version};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering, fence};
@@ -24,6 +26,7 @@ use thiserror::Error;
 pub(crate) struct Word(AtomicU64);
 
 impl Word {
+    #[inline]
     pub(crate) fn load(&self) -> u64 {
         self.0.load(Ordering::Relaxed)
     }
@@ -60,18 +63,6 @@ pub enum ReadError {
     },
 }
 
-/// Memory that a segment of the arena lies in.
-pub(crate) trait Segment: Send + Sync + std::fmt::Debug {
-    /// The segment's words.
-    fn words(&self) -> &[Word];
-}
-
-impl Segment for Box<[Word]> {
-    fn words(&self) -> &[Word] {
-        self
-    }
-}
-
 pub(crate) const MAGIC: u64 = u64::from_le_bytes(*b"cortexG1");
 pub(crate) const FORMAT: u64 = 3;
 
@@ -83,6 +74,8 @@ mod at {
     pub(super) const HEAD: usize = 3;
     pub(super) const OLDEST: usize = 4;
     pub(super) const SEGMENTS: usize = 5;
+    pub(super) const BELL: usize = 6;
+    pub(super) const ASLEEP: usize = 7;
     pub(super) const ROOTS: usize = 64;
 }
 
@@ -98,8 +91,8 @@ pub(crate) const FIRST_BLOCK: Address = at::ROOTS as u64 + ROOT_RING * ROOT_WORD
 pub(crate) struct Root {
     pub(crate) version: u64,
     pub(crate) time: i64,
-    /// Trie from node id to node record.
-    pub(crate) nodes: Address,
+    /// Link to the trie from node id to node record.
+    pub(crate) nodes: trie::Link,
     /// Tree from (hash of name, node id) to node record.
     pub(crate) names: Address,
     /// Directory by type: tree of node ids, count.
@@ -213,7 +206,7 @@ impl Root {
 /// The arena as one process sees it.
 #[derive(Debug)]
 pub(crate) struct Arena {
-    segments: Box<[OnceLock<Box<dyn Segment>>]>,
+    segments: Box<[OnceLock<Segment>]>,
     /// log2 of the words in a segment.
     shift: u32,
 }
@@ -244,7 +237,7 @@ impl Arena {
     }
 
     /// Adds segment `index`; one that is there already stays.
-    pub(crate) fn attach(&self, index: usize, segment: Box<dyn Segment>) {
+    pub(crate) fn attach(&self, index: usize, segment: Segment) {
         if let Some(slot) = self.segments.get(index)
             && segment.words().len() >= self.segment_words()
         {
@@ -253,6 +246,7 @@ impl Arena {
     }
 
     /// The words from `address` to the end of its segment.
+    #[inline]
     pub(crate) fn from(&self, address: Address) -> Option<&[Word]> {
         let segment = self.segments.get((address >> self.shift) as usize)?.get()?;
         segment
@@ -303,7 +297,28 @@ impl Arena {
         }
     }
 
+    /// The word that a process sleeps on until the store has answered or committed something.
+    pub(crate) fn bell(&self) -> Option<&Word> {
+        self.header(at::BELL)
+    }
+
+    /// The store says whether it sleeps, before it looks for requests one last time.
+    pub(crate) fn set_asleep(&self, asleep: bool) {
+        if let Some(word) = self.header(at::ASLEEP) {
+            word.store(u64::from(asleep));
+        }
+        fence(Ordering::SeqCst);
+    }
+
+    /// Whether the store has to be woken for a request that was sent before this call: either this
+    /// sees that it sleeps, or its last look sees the request.
+    pub(crate) fn is_asleep(&self) -> bool {
+        fence(Ordering::SeqCst);
+        self.header(at::ASLEEP).is_none_or(|word| word.load() != 0)
+    }
+
     /// The newest version.
+    #[inline]
     pub(crate) fn head(&self) -> u64 {
         self.header(at::HEAD).map_or(0, Word::load_acquire)
     }
@@ -401,6 +416,7 @@ impl Arena {
     }
 
     /// Whether all that was read of `version` up to now was genuine.
+    #[inline]
     pub(crate) fn check(&self, version: u64) -> Result<(), ReadError> {
         fence(Ordering::Acquire);
         let oldest = self.oldest();

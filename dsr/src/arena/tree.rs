@@ -17,8 +17,10 @@ const CAPACITY: usize = 32;
 /// No tree is deeper; a deeper one is damaged.
 const MAX_DEPTH: usize = 20;
 
+#[derive(Debug, Clone, Copy)]
 struct Block<'a> {
     inner: bool,
+    len: usize,
     words: &'a [Word],
 }
 
@@ -26,19 +28,20 @@ impl<'a> Block<'a> {
     fn at(arena: &'a Arena, address: Address) -> Result<Self, Address> {
         let words = arena.from(address).ok_or(address)?;
         let head = words.first().ok_or(address)?.load();
-        let count = (head >> 1) as usize;
-        if count == 0 || count > CAPACITY {
+        let len = (head >> 1) as usize;
+        if len == 0 || len > CAPACITY {
             return Err(address);
         }
-        let words = words.get(1..=3 * count).ok_or(address)?;
+        let words = words.get(1..=3 * len).ok_or(address)?;
         Ok(Self {
             inner: head & 1 == 1,
+            len,
             words,
         })
     }
 
     fn len(&self) -> usize {
-        self.words.len() / 3
+        self.len
     }
 
     fn key(&self, index: usize) -> Key {
@@ -98,79 +101,91 @@ pub(crate) fn find(arena: &Arena, root: Address, key: Key) -> Result<Option<u64>
 
 /// Walks the entries from `from` to `to` (both included) in ascending order.
 #[derive(Debug, Clone)]
-pub(crate) struct Range {
+pub(crate) struct Range<'a> {
+    arena: &'a Arena,
     /// Inner blocks on the way down, with the next child to visit.
-    path: Vec<(Address, usize)>,
-    leaf: Address,
-    index: usize,
+    path: Vec<(Block<'a>, usize)>,
+    /// What is left of the leaf at hand, three words an entry.
+    leaf: std::slice::ChunksExact<'a, Word>,
     to: Key,
+    /// The last key of that leaf.
     last: Option<Key>,
 }
 
-impl Range {
-    pub(crate) fn new(arena: &Arena, root: Address, from: Key, to: Key) -> Result<Self, Address> {
+impl<'a> Range<'a> {
+    pub(crate) fn new(
+        arena: &'a Arena,
+        root: Address,
+        from: Key,
+        to: Key,
+    ) -> Result<Self, Address> {
         let mut range = Self {
+            arena,
             path: Vec::new(),
-            leaf: 0,
-            index: 0,
+            leaf: [].chunks_exact(3),
             to,
             last: None,
         };
         if root != 0 && from <= to {
-            range.descend(arena, root, Some(from))?;
+            range.descend(root, Some(from))?;
         }
         Ok(range)
     }
 
-    fn descend(&mut self, arena: &Arena, root: Address, key: Option<Key>) -> Result<(), Address> {
+    fn descend(&mut self, root: Address, from: Option<Key>) -> Result<(), Address> {
         let mut address = root;
         while self.path.len() < MAX_DEPTH {
-            let block = Block::at(arena, address)?;
+            let block = Block::at(self.arena, address)?;
             if block.inner {
-                let child = key.map_or(0, |key| block.child_of(key));
-                self.path.push((address, child + 1));
+                let child = from.map_or(0, |key| block.child_of(key));
+                self.path.push((block, child + 1));
                 address = block.word(child);
-            } else {
-                self.leaf = address;
-                self.index = key.map_or(0, |key| block.lower_bound(key));
-                return Ok(());
+                continue;
             }
+            let first = from.map_or(0, |key| block.lower_bound(key));
+            let last = block.key(block.len() - 1);
+            // Ascending keys also bound the walk in a damaged arena.
+            if self.last.is_some_and(|before| block.key(0) <= before) {
+                return Err(address);
+            }
+            self.last = Some(last);
+            let end = if last <= self.to {
+                block.len()
+            } else {
+                self.path.clear();
+                let after = block.lower_bound(self.to);
+                after + usize::from(after < block.len() && block.key(after) == self.to)
+            };
+            let entries = block.words.get(3 * first..3 * end.max(first));
+            self.leaf = entries.unwrap_or(&[]).chunks_exact(3);
+            return Ok(());
         }
         Err(address)
     }
 
     /// The next entry; `Err` where the tree leads to an impossible place.
-    pub(crate) fn next(&mut self, arena: &Arena) -> Result<Option<Entry>, Address> {
-        while self.leaf != 0 {
-            let block = Block::at(arena, self.leaf)?;
-            if block.inner {
-                return Err(self.leaf);
+    #[inline]
+    pub(crate) fn next(&mut self) -> Result<Option<Entry>, Address> {
+        loop {
+            if let Some([a, b, word]) = self.leaf.next() {
+                return Ok(Some(([a.load(), b.load()], word.load())));
             }
-            if self.index < block.len() {
-                let key = block.key(self.index);
-                // Ascending keys also bound the walk in a damaged arena.
-                if self.last.is_some_and(|last| key <= last) {
-                    return Err(self.leaf);
-                }
-                if key > self.to {
-                    self.leaf = 0;
-                    return Ok(None);
-                }
-                self.last = Some(key);
-                self.index += 1;
-                return Ok(Some((key, block.word(self.index - 1))));
-            }
-            self.leaf = 0;
-            while let Some((address, child)) = self.path.pop() {
-                let block = Block::at(arena, address)?;
-                if child < block.len() {
-                    self.path.push((address, child + 1));
-                    self.descend(arena, block.word(child), None)?;
-                    break;
-                }
+            if !self.next_leaf()? {
+                return Ok(None);
             }
         }
-        Ok(None)
+    }
+
+    /// Goes on to the next leaf, if there is one.
+    fn next_leaf(&mut self) -> Result<bool, Address> {
+        while let Some((block, child)) = self.path.pop() {
+            if child < block.len() {
+                self.path.push((block, child + 1));
+                self.descend(block.word(child), None)?;
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 }
 

@@ -1,209 +1,263 @@
-//! The map from node id to node record: a trie of 64-way bitmap nodes over the id, lowest six bits
-//! first, so that ids that run from 1 make the shallowest trie and a few wild ones cost nobody.
+//! The map from node id to node record: a trie of 32-way bitmap nodes over the id, highest bits
+//! first, without levels in which there is nothing to choose. So ids that follow each other lie
+//! side by side, a graph whose ids run from 1 has the shallowest trie, and a few wild ones cost
+//! everybody one level.
 //!
-//! Inner block: bitmap, then one child per set bit, lowest first. A child is `address << 1`, plus
-//! 1 where it is a record. A record's first word is its id. An empty trie is address 0.
+//! Block: bitmap, the ids' common bits above the level, then one link per set bit, lowest first. A
+//! link is `address << 1`, plus 1 where it leads to a record, else with the block's level in bits
+//! 60 to 63: level `l` goes by bits `5 l` to `5 l + 4`. Wider blocks would be read in fewer steps, but
+//! every commit copies those above the node that it changes. A record's first word is its id. An empty
+//! trie is link 0.
 
 use super::allocator::Full;
-use super::{Address, Arena};
+use super::{Address, Arena, Word};
 use crate::graph::Writer;
 
-/// No id has more groups of six bits than this.
-const MAX_DEPTH: u32 = 11;
+/// The way to a block or a record.
+pub(crate) type Link = u64;
 
-fn slot(id: u64, depth: u32) -> u64 {
-    if depth < MAX_DEPTH {
-        (id >> (6 * depth)) & 63
-    } else {
-        0
-    }
+/// Bits of the id that a level goes by.
+const BITS: u64 = 5;
+const WIDTH: u64 = 1 << BITS;
+/// No id has more groups of so many bits than this.
+const LEVELS: u64 = 64u64.div_ceil(BITS);
+/// Bitmap and prefix.
+const HEADER: usize = 2;
+/// Words of the largest block.
+const LARGEST: usize = HEADER + WIDTH as usize;
+
+fn slot(id: u64, level: u64) -> u64 {
+    (id >> (BITS * level)) & (WIDTH - 1)
+}
+
+/// The bits of `id` above a level.
+fn prefix(id: u64, level: u64) -> u64 {
+    id.checked_shr((BITS * (level + 1)) as u32).unwrap_or(0)
 }
 
 fn rank(bitmap: u64, bit: u64) -> usize {
     (bitmap & ((1 << bit) - 1)).count_ones() as usize
 }
 
+fn to_record(address: Address) -> Link {
+    address << 1 | 1
+}
+
+fn to_block(address: Address, level: u64) -> Link {
+    address << 1 | level << 60
+}
+
+fn is_record(link: Link) -> bool {
+    link & 1 == 1
+}
+
+fn address_of(link: Link) -> Address {
+    (link & ((1 << 60) - 1)) >> 1
+}
+
+fn level_of(link: Link) -> u64 {
+    link >> 60
+}
+
 /// The record of node `id`; `Err` where the trie leads to an impossible place.
-pub(crate) fn find(arena: &Arena, root: Address, id: u64) -> Result<Option<Address>, Address> {
-    let mut block = root;
-    for depth in 0..MAX_DEPTH {
-        if block == 0 {
+#[inline]
+pub(crate) fn find(arena: &Arena, root: Link, id: u64) -> Result<Option<Address>, Address> {
+    let mut link = root;
+    // One block per level, then a record.
+    for _ in 0..=LEVELS {
+        if link == 0 {
             return Ok(None);
         }
-        let words = arena.from(block).ok_or(block)?;
-        let bitmap = words.first().ok_or(block)?.load();
-        let bit = slot(id, depth);
-        if bitmap & (1 << bit) == 0 {
+        let address = address_of(link);
+        let words = arena.from(address).ok_or(address)?;
+        let first = words.first().ok_or(address)?.load();
+        if is_record(link) {
+            return Ok((first == id).then_some(address));
+        }
+        let level = level_of(link);
+        if level >= LEVELS {
+            return Err(address);
+        }
+        let bit = slot(id, level);
+        if first & (1 << bit) == 0 {
             return Ok(None);
         }
-        let child = words.get(1 + rank(bitmap, bit)).ok_or(block)?.load();
-        let address = child >> 1;
-        if child & 1 == 1 {
-            let found = arena
-                .from(address)
-                .and_then(<[_]>::first)
-                .ok_or(address)?
-                .load();
-            return Ok((found == id).then_some(address));
-        }
-        block = address;
+        let at = HEADER + rank(first, bit);
+        link = words.get(at).ok_or(address)?.load();
     }
-    Err(block)
+    Err(address_of(link))
+}
+
+/// A block on its way to being written again.
+struct Block {
+    words: [u64; LARGEST],
+    len: usize,
+}
+
+impl Block {
+    fn read(writer: &Writer, address: Address) -> Self {
+        let from = writer.arena().from(address).unwrap_or(&[]);
+        let bitmap = from.first().map_or(0, Word::load);
+        let len = HEADER + bitmap.count_ones() as usize;
+        let mut words = [0; LARGEST];
+        for (to, from) in words[..len].iter_mut().zip(from) {
+            *to = from.load();
+        }
+        Self { words, len }
+    }
+
+    fn has(&self, bit: u64) -> bool {
+        self.words[0] & (1 << bit) != 0
+    }
+
+    fn at(&self, bit: u64) -> usize {
+        HEADER + rank(self.words[0], bit)
+    }
+
+    fn insert(&mut self, bit: u64, link: Link) {
+        let at = self.at(bit);
+        self.words.copy_within(at..self.len, at + 1);
+        self.words[at] = link;
+        self.words[0] |= 1 << bit;
+        self.len += 1;
+    }
+
+    fn remove(&mut self, bit: u64) {
+        let at = self.at(bit);
+        self.words.copy_within(at + 1..self.len, at);
+        self.words[0] &= !(1 << bit);
+        self.len -= 1;
+    }
+
+    fn words(&self) -> &[u64] {
+        &self.words[..self.len]
+    }
 }
 
 /// Puts `record` (whose first word is `id`) into the trie, in place of the one that is there.
 pub(crate) fn insert(
     writer: &mut Writer,
-    root: Address,
+    link: Link,
     id: u64,
     record: Address,
-) -> Result<Address, Full> {
-    if root == 0 {
-        return writer.write(&[1 << slot(id, 0), record << 1 | 1]);
+) -> Result<Link, Full> {
+    if link == 0 {
+        return Ok(to_record(record));
     }
-    insert_at(writer, root, id, record, 0)
-}
-
-fn insert_at(
-    writer: &mut Writer,
-    block: Address,
-    id: u64,
-    record: Address,
-    depth: u32,
-) -> Result<Address, Full> {
-    let mut words = read(writer, block);
-    let bit = slot(id, depth);
-    let at = 1 + rank(words[0], bit);
-    if words[0] & (1 << bit) == 0 {
-        words[0] |= 1 << bit;
-        words.insert(at, record << 1 | 1);
-        return writer.replace(block, words.len() - 1, &words);
-    }
-    let child = words[at];
-    let address = child >> 1;
-    let new = if child & 1 == 0 {
-        insert_at(writer, address, id, record, depth + 1)? << 1
-    } else {
-        let other = writer
-            .arena()
-            .from(address)
-            .and_then(<[_]>::first)
-            .map_or(id, super::Word::load);
+    let address = address_of(link);
+    if is_record(link) {
+        let other = writer.arena().from(address).and_then(<[_]>::first);
+        let other = other.map_or(id, Word::load);
         if other == id {
-            record << 1 | 1
-        } else {
-            split(writer, (other, address), (id, record), depth + 1)? << 1
+            return Ok(to_record(record));
         }
-    };
-    if new == child {
-        return Ok(block);
+        return join(writer, (other, link), (id, to_record(record)));
     }
-    words[at] = new;
-    writer.replace(block, words.len(), &words)
-}
-
-/// A block that holds two records whose ids agree in their lowest `6 * depth` bits.
-fn split(
-    writer: &mut Writer,
-    a: (u64, Address),
-    b: (u64, Address),
-    depth: u32,
-) -> Result<Address, Full> {
-    let (bit_a, bit_b) = (slot(a.0, depth), slot(b.0, depth));
-    if bit_a == bit_b {
-        let below = split(writer, a, b, depth + 1)?;
-        return writer.write(&[1 << bit_a, below << 1]);
+    let level = level_of(link);
+    let mut block = Block::read(writer, address);
+    if block.words[1] != prefix(id, level) {
+        // Any id below the block will do; above it they are all alike.
+        let other = block.words[1] << (BITS * (level + 1));
+        return join(writer, (other, link), (id, to_record(record)));
     }
-    let (first, second) = if bit_a < bit_b {
-        (a.1, b.1)
+    let bit = slot(id, level);
+    let old = block.len;
+    if block.has(bit) {
+        let at = block.at(bit);
+        let below = insert(writer, block.words[at], id, record)?;
+        if below == block.words[at] {
+            return Ok(link);
+        }
+        block.words[at] = below;
     } else {
-        (b.1, a.1)
+        block.insert(bit, to_record(record));
+    }
+    let address = writer.replace(address, old, block.words())?;
+    Ok(to_block(address, level))
+}
+
+/// A block over two links whose ids differ, at the level of their highest difference.
+fn join(writer: &mut Writer, a: (u64, Link), b: (u64, Link)) -> Result<Link, Full> {
+    let level = u64::from((a.0 ^ b.0).ilog2()) / BITS;
+    let mut block = Block {
+        words: [0; LARGEST],
+        len: HEADER,
     };
-    writer.write(&[1 << bit_a | 1 << bit_b, first << 1 | 1, second << 1 | 1])
+    block.words[1] = prefix(a.0, level);
+    for (id, link) in [a, b] {
+        block.insert(slot(id, level), link);
+    }
+    Ok(to_block(writer.write(block.words())?, level))
 }
 
-/// Takes node `id` out of the trie; the trie's new root, 0 where it is empty.
-pub(crate) fn remove(writer: &mut Writer, block: Address, id: u64) -> Result<Address, Full> {
-    remove_at(writer, block, id, 0)
-}
-
-fn remove_at(writer: &mut Writer, block: Address, id: u64, depth: u32) -> Result<Address, Full> {
-    if block == 0 {
+/// Takes node `id` out of the trie; the link to what is left, 0 where that is nothing.
+pub(crate) fn remove(writer: &mut Writer, link: Link, id: u64) -> Result<Link, Full> {
+    let address = address_of(link);
+    if is_record(link) {
+        let found = writer.arena().from(address).and_then(<[_]>::first);
+        let found = found.map(Word::load);
+        return Ok(if found == Some(id) { 0 } else { link });
+    }
+    if link == 0 {
         return Ok(0);
     }
-    let mut words = read(writer, block);
-    let bit = slot(id, depth);
-    if words[0] & (1 << bit) == 0 {
-        return Ok(block);
+    let level = level_of(link);
+    let mut block = Block::read(writer, address);
+    let bit = slot(id, level);
+    if !block.has(bit) {
+        return Ok(link);
     }
-    let at = 1 + rank(words[0], bit);
-    let old_len = words.len();
-    let child = words[at];
-    let below = if child & 1 == 1 {
-        0
+    let old = block.len;
+    let at = block.at(bit);
+    let below = remove(writer, block.words[at], id)?;
+    if below == block.words[at] {
+        return Ok(link);
+    }
+    if below == 0 {
+        block.remove(bit);
     } else {
-        remove_at(writer, child >> 1, id, depth + 1)?
-    };
-    if below != 0 {
-        if below << 1 == child {
-            return Ok(block);
-        }
-        words[at] = below << 1;
-        return writer.replace(block, old_len, &words);
+        block.words[at] = below;
     }
-    words[0] &= !(1 << bit);
-    words.remove(at);
-    if words[0] == 0 {
-        writer.retire(block, old_len);
-        return Ok(0);
+    // A block with one link is a level with nothing to choose.
+    if block.len == HEADER + 1 {
+        writer.retire(address, old);
+        return Ok(block.words[HEADER]);
     }
-    writer.replace(block, old_len, &words)
+    let address = writer.replace(address, old, block.words())?;
+    Ok(to_block(address, level))
 }
 
-fn read(writer: &Writer, block: Address) -> Vec<u64> {
-    let words = writer.arena().from(block).unwrap_or(&[]);
-    let bitmap = words.first().map_or(0, super::Word::load);
-    let len = 1 + bitmap.count_ones() as usize;
-    words.iter().take(len).map(super::Word::load).collect()
-}
-
-/// Walks the records in the trie's own order, which depends on the ids alone.
+/// Walks the records by ascending id.
 #[derive(Debug, Clone)]
 pub(crate) struct Walk {
-    /// Children still to visit, last first.
-    stack: Vec<u64>,
+    /// Links still to follow, last first.
+    stack: Vec<Link>,
     /// Bounds the walk in a damaged arena.
     budget: u64,
 }
 
 impl Walk {
-    pub(crate) fn new(root: Address, count: u64) -> Self {
-        let stack = if root == 0 {
-            Vec::new()
-        } else {
-            vec![root << 1]
-        };
+    pub(crate) fn new(root: Link, count: u64) -> Self {
         Self {
-            stack,
-            budget: count
-                .saturating_mul(u64::from(MAX_DEPTH) + 1)
-                .saturating_add(1),
+            stack: if root == 0 { Vec::new() } else { vec![root] },
+            budget: count.saturating_mul(LEVELS + 1).saturating_add(1),
         }
     }
 
     /// The next record; `Err` where the trie leads to an impossible place.
     pub(crate) fn next(&mut self, arena: &Arena) -> Result<Option<Address>, Address> {
-        while let Some(child) = self.stack.pop() {
-            let address = child >> 1;
-            if child & 1 == 1 {
+        while let Some(link) = self.stack.pop() {
+            let address = address_of(link);
+            if is_record(link) {
                 return Ok(Some(address));
             }
             self.budget = self.budget.checked_sub(1).ok_or(address)?;
             let words = arena.from(address).ok_or(address)?;
             let bitmap = words.first().ok_or(address)?.load();
-            let children = words.get(1..=bitmap.count_ones() as usize).ok_or(address)?;
-            self.stack
-                .extend(children.iter().rev().map(super::Word::load));
+            let links = words
+                .get(HEADER..HEADER + bitmap.count_ones() as usize)
+                .ok_or(address)?;
+            self.stack.extend(links.iter().rev().map(Word::load));
         }
         Ok(None)
     }

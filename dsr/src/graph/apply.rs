@@ -9,7 +9,7 @@ mod nodes;
 use super::Graph;
 use super::image::{AttributeImage, Image};
 use crate::arena::allocator::Full;
-use crate::arena::record::{self, AttributeRecord, split_row};
+use crate::arena::record;
 use crate::arena::{Address, Root};
 use crate::{
     AttributeId, AttributeType, Change, EdgeChange, EdgeKey, EdgeRef, LabelId, NodeChange, NodeId,
@@ -217,18 +217,13 @@ impl<'a> Work<'a> {
 
     fn value_of(&self, owner: &Owner, name: &str) -> Result<Option<Value>, Refusal> {
         let attribute = self.schema().attribute_id(name)?;
-        let rows = match owner {
-            Owner::Node(node) => self.node(node)?.1.rows,
-            Owner::Edge(edge) => self.edge(edge)?.2.rows,
+        let table = match owner {
+            Owner::Node(node) => self.node(node)?.1.table,
+            Owner::Edge(edge) => self.edge(edge)?.2.table,
         };
-        let address = rows
-            .iter()
-            .map(|&r| split_row(r))
-            .find(|(a, _)| *a == attribute.0);
-        address
-            .map(|(_, at)| read(AttributeRecord::read(&self.graph.writer.arena, at)))
-            .transpose()
-            .map(|found| found.map(|record| record.value))
+        let place = table.find(attribute.0);
+        let record = place.map(|place| read(table.attribute(&self.graph.writer.arena, place)));
+        Ok(record.transpose()?.map(|record| record.value))
     }
 
     pub(super) fn apply(&mut self, operations: &[Operation]) -> Result<(), Refusal> {

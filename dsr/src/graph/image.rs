@@ -169,7 +169,7 @@ impl Graph {
                 "a graph; only an empty one can be filled".into(),
             ));
         }
-        let before = (Arc::clone(&self.schema), self.writers.clone());
+        let before = (Arc::clone(&self.schema), Arc::clone(&self.writers));
         if self.schema.is_open() {
             self.schema = Arc::new(image.schema.clone());
         }

@@ -40,7 +40,7 @@ pub struct Limits {
 impl Default for Limits {
     fn default() -> Self {
         Self {
-            history_bytes: 64 << 20,
+            history_bytes: 16 << 20,
         }
     }
 }
@@ -50,6 +50,8 @@ impl Default for Limits {
 pub(crate) struct Writer {
     arena: Arc<Arena>,
     allocator: Allocator,
+    /// Where a block's words are put together; empty between uses.
+    scratch: Vec<u64>,
 }
 
 impl Writer {
@@ -88,6 +90,23 @@ impl Writer {
         Ok(new)
     }
 
+    /// Writes what `encode` appends, in place of the `old` block and its words where there is one.
+    pub(crate) fn put(
+        &mut self,
+        old: Option<(Address, usize)>,
+        encode: impl FnOnce(&mut Vec<u64>),
+    ) -> Result<Address, Full> {
+        let mut words = std::mem::take(&mut self.scratch);
+        words.clear();
+        encode(&mut words);
+        let put = match old {
+            Some((address, len)) => self.replace(address, len, &words),
+            None => self.write(&words),
+        };
+        self.scratch = words;
+        put
+    }
+
     pub(crate) fn retire(&mut self, address: Address, words: usize) {
         if address != 0 {
             self.allocator.retire(address, words);
@@ -118,7 +137,7 @@ pub struct Graph {
     writer: Writer,
     root: Root,
     schema: Arc<Schema>,
-    writers: Vec<String>,
+    writers: Arc<Vec<String>>,
     epoch: Epoch,
     limits: Limits,
     rules: Option<Arc<dyn RuleEngine>>,
@@ -146,13 +165,17 @@ impl Graph {
         growth.reserve(0, 0, crate::arena::FIRST_BLOCK as usize)?;
         let allocator = Allocator::new(growth);
         let mut graph = Self {
-            writer: Writer { arena, allocator },
+            writer: Writer {
+                arena,
+                allocator,
+                scratch: Vec::new(),
+            },
             root: Root {
                 next_id: 1,
                 ..Root::default()
             },
             schema: Arc::new(schema),
-            writers: Vec::new(),
+            writers: Arc::default(),
             epoch,
             limits: Limits::default(),
             rules: None,
@@ -192,6 +215,11 @@ impl Graph {
         self.epoch
     }
 
+    /// The memory that it lies in.
+    pub(crate) fn arena(&self) -> &Arena {
+        &self.writer.arena
+    }
+
     /// Shows the graph to other processes, which until then see none: what they see first is
     /// whole.
     pub(crate) fn announce(&self) {
@@ -213,7 +241,7 @@ impl Graph {
         agent: &str,
         time: Time,
     ) -> Result<(Commit, Change), Refusal> {
-        let before = (Arc::clone(&self.schema), self.writers.clone());
+        let before = (Arc::clone(&self.schema), Arc::clone(&self.writers));
         let outcome = match self.try_commit(transaction, agent, time) {
             Err(Refusal::OutOfMemory { .. }) => {
                 // History gives way before a commit is refused.
@@ -256,10 +284,10 @@ impl Graph {
         work.finish()
     }
 
-    fn abandon(&mut self, before: &(Arc<Schema>, Vec<String>)) {
+    fn abandon(&mut self, before: &(Arc<Schema>, Arc<Vec<String>>)) {
         self.writer.allocator.abandoned();
         self.schema = Arc::clone(&before.0);
-        self.writers.clone_from(&before.1);
+        self.writers = Arc::clone(&before.1);
     }
 
     fn publish(&mut self, root: Root) {
@@ -299,7 +327,7 @@ impl Graph {
             return Ok(index as u16);
         }
         let index = u16::try_from(self.writers.len()).map_err(|_| Full)?;
-        let mut writers = self.writers.clone();
+        let mut writers = Vec::clone(&self.writers);
         writers.push(agent.to_owned());
         self.write_writers(writers, root)?;
         Ok(index)
@@ -307,7 +335,7 @@ impl Graph {
 
     fn write_writers(&mut self, writers: Vec<String>, root: &mut Root) -> Result<(), Full> {
         let bytes = postcard::to_stdvec(&writers).unwrap_or_default();
-        self.writers = writers;
+        self.writers = Arc::new(writers);
         let old = root.writers;
         root.writers = record::write_blob(&mut self.writer, &bytes)?;
         if old != 0 {

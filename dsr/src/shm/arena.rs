@@ -5,11 +5,12 @@
 //! and `tests/all/graph.rs` holds the construct.
 
 use super::{
-    InstanceError, Ipc, IpcNode, MAX_PROCESSES, MAX_STORES, ipc, one_at_a_time, service_name,
+    InstanceError, Ipc, IpcNode, MAX_PROCESSES, MAX_STORES, Segment, ipc, one_at_a_time,
+    service_name,
 };
 use crate::Epoch;
 use crate::arena::allocator::{Full, Growth};
-use crate::arena::{Arena, Segment, Word};
+use crate::arena::{Arena, Word};
 use iceoryx2::port::publisher::Publisher as IpcPublisher;
 use iceoryx2::port::subscriber::Subscriber as IpcSubscriber;
 use iceoryx2::port::update_connections::UpdateConnections;
@@ -17,7 +18,7 @@ use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy, ZeroCopySend};
 use iceoryx2::sample::Sample;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use rustix::mm::{Advice, madvise};
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError, RwLock};
 
 /// log2 of the words in a segment: 64 MiB.
 const SHIFT: u32 = 23;
@@ -126,15 +127,12 @@ impl Growth for SharedGrowth {
         let sample = unsafe { sample.assume_init() };
         sample.send().map_err(|_| Full)?;
         self.starts.push(start);
-        let publisher = Arc::clone(&self.publisher);
-        arena.attach(
-            index,
-            Box::new(OwnSegment {
-                _publisher: publisher,
-                start,
-                len,
-            }),
-        );
+        let publisher = Box::new(Arc::clone(&self.publisher));
+        // SAFETY: `start` points to `len` initialised words in the publisher's data segment, which
+        // stays mapped while the publisher lives; the sample stays in its history for ever, so the
+        // memory is never loaned again. Others only ever touch it through atomics.
+        let segment = unsafe { Segment::in_shared_memory(start, len, publisher) };
+        arena.attach(index, segment);
         Ok(())
     }
 
@@ -168,41 +166,26 @@ fn populate(start: *const Word, len: usize) -> rustix::io::Result<()> {
     }
 }
 
-/// A segment as the store sees it: writable.
-#[derive(Debug)]
-struct OwnSegment {
-    /// Owns the memory.
-    _publisher: Arc<IpcPublisher<Ipc, [Word], SegmentHeader>>,
-    start: *const Word,
-    len: usize,
-}
-
-// SAFETY: the segment is a range of atomics, which any thread may use at any time, and the
-// publisher that owns it is itself safe to send and share.
-unsafe impl Send for OwnSegment {}
-// SAFETY: as above.
-unsafe impl Sync for OwnSegment {}
-
-impl Segment for OwnSegment {
-    fn words(&self) -> &[Word] {
-        // SAFETY: `start` points to `len` initialised words in the publisher's data segment, which
-        // stays mapped while `_publisher` lives; the sample stays in its history for ever, so the
-        // memory is never loaned again. Others only ever touch it through atomics.
-        unsafe { std::slice::from_raw_parts(self.start, self.len) }
-    }
-}
-
 /// A segment as a reader sees it: mapped read-only.
-#[derive(Debug)]
-struct ReceivedSegment(Sample<Ipc, [Word], SegmentHeader>);
+fn received(sample: Sample<Ipc, [Word], SegmentHeader>) -> Segment {
+    let (start, len) = (sample.payload().as_ptr(), sample.payload().len());
+    // SAFETY: the payload is `len` atomics in shared memory that stays mapped while the sample
+    // lives, and moving the sample does not move it.
+    unsafe { Segment::in_shared_memory(start, len, Box::new(sample)) }
+}
 
-// SAFETY: the sample is only read through `words`, which gives atomics in memory that stays mapped
-// while the sample lives; the thread-safe service variant guards the rest of it.
-unsafe impl Sync for ReceivedSegment {}
+/// The newest store's arena, for those who wait for its bell.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Current(Arc<RwLock<Option<Arc<Arena>>>>);
 
-impl Segment for ReceivedSegment {
-    fn words(&self) -> &[Word] {
-        self.0.payload()
+impl Current {
+    pub(super) fn arena(&self) -> Option<Arc<Arena>> {
+        let found = self.0.read().unwrap_or_else(PoisonError::into_inner);
+        found.clone()
+    }
+
+    fn set(&self, arena: Arc<Arena>) {
+        *self.0.write().unwrap_or_else(PoisonError::into_inner) = Some(arena);
     }
 }
 
@@ -211,6 +194,7 @@ impl Segment for ReceivedSegment {
 pub(crate) struct ArenaSubscriber {
     subscriber: IpcSubscriber<Ipc, [Word], SegmentHeader>,
     arena: Option<(Epoch, Arc<Arena>)>,
+    pub(super) current: Current,
     /// Segments of an epoch whose first segment is not here yet.
     early: Vec<Sample<Ipc, [Word], SegmentHeader>>,
 }
@@ -225,6 +209,7 @@ impl ArenaSubscriber {
         Ok(Self {
             subscriber,
             arena: None,
+            current: Current::default(),
             early: Vec::new(),
         })
     }
@@ -237,17 +222,18 @@ impl ArenaSubscriber {
             if header.index == 0 && known != Some(header.epoch) {
                 // A first segment of another epoch: a new store, whose arena replaces the old.
                 let arena = Arc::new(Arena::new(CAPACITY, SHIFT));
-                arena.attach(0, Box::new(ReceivedSegment(sample)));
+                arena.attach(0, received(sample));
                 self.arena = Some((Epoch(header.epoch), Arc::clone(&arena)));
+                self.current.set(Arc::clone(&arena));
                 for early in self.early.drain(..) {
                     if early.user_header().epoch == header.epoch {
                         let index = early.user_header().index as usize;
-                        arena.attach(index, Box::new(ReceivedSegment(early)));
+                        arena.attach(index, received(early));
                     }
                 }
             } else if known == Some(header.epoch) {
                 if let Some((_, arena)) = &self.arena {
-                    arena.attach(header.index as usize, Box::new(ReceivedSegment(sample)));
+                    arena.attach(header.index as usize, received(sample));
                 }
             } else {
                 self.early.push(sample);

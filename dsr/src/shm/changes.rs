@@ -1,9 +1,10 @@
 //! Following the commits of an instance. This file guarantees that a subscriber which missed some is
 //! told so.
 
-use super::{InstanceError, Ipc, Subscriber};
+use super::arena::Current;
+use super::{InstanceError, Subscriber, bell, now, pause};
 use crate::{Change, Epoch, Filter, Schema, Version};
-use iceoryx2::port::listener::Listener;
+use std::collections::VecDeque;
 use std::time::Duration;
 
 /// What a subscription gives.
@@ -18,8 +19,10 @@ pub enum Update {
 /// A subscription to commits.
 #[derive(Debug)]
 pub struct Changes {
-    pub(super) subscriber: Subscriber<Change>,
-    pub(super) listener: Listener<Ipc>,
+    pub(super) subscriber: Subscriber<Vec<Change>>,
+    /// What has come and was not given out.
+    pub(super) waiting: VecDeque<Change>,
+    pub(super) current: Current,
     pub(super) filter: Filter,
     pub(super) epoch: Epoch,
     pub(super) seen: Version,
@@ -30,8 +33,30 @@ impl Changes {
     ///
     /// # Errors
     /// [`InstanceError`].
-    pub fn wait(&self, patience: Duration) -> Result<(), InstanceError> {
-        super::wait(&self.listener, patience, "waiting for a commit")
+    pub fn wait(&mut self, patience: Duration) -> Result<(), InstanceError> {
+        let deadline = now() + patience;
+        loop {
+            let arena = self.current.arena();
+            let heard = arena.as_deref().map_or(0, bell::listen);
+            self.fetch()?;
+            let left = deadline.saturating_duration_since(now());
+            if !self.waiting.is_empty() || left.is_zero() {
+                return Ok(());
+            }
+            // The bell of a store that died stays silent, and the next store has another.
+            let nap = left.min(Duration::from_millis(20));
+            match &arena {
+                Some(arena) => bell::sleep(arena, heard, nap),
+                None => pause(nap),
+            }
+        }
+    }
+
+    fn fetch(&mut self) -> Result<(), InstanceError> {
+        while let Some(changes) = self.subscriber.receive()? {
+            self.waiting.extend(changes);
+        }
+        Ok(())
     }
 
     /// The next commit that passes the filter, or the news that some were missed.
@@ -39,7 +64,14 @@ impl Changes {
     /// # Errors
     /// [`InstanceError`].
     pub fn next(&mut self, schema: &Schema) -> Result<Option<Update>, InstanceError> {
-        while let Some(change) = self.subscriber.receive()? {
+        loop {
+            let Some(change) = self.waiting.pop_front() else {
+                match self.subscriber.receive()? {
+                    Some(changes) => self.waiting.extend(changes),
+                    None => return Ok(None),
+                }
+                continue;
+            };
             // What the subscription started from is known already; another store's is not.
             if change.epoch == self.epoch && change.version <= self.seen {
                 continue;
@@ -54,6 +86,5 @@ impl Changes {
                 return Ok(Some(Update::Change(change)));
             }
         }
-        Ok(None)
     }
 }

@@ -6,6 +6,7 @@ use super::{InstanceError, Ipc, IpcNode, MAX_PROCESSES, ipc, one_at_a_time, serv
 use iceoryx2::port::publisher::Publisher as IpcPublisher;
 use iceoryx2::port::subscriber::Subscriber as IpcSubscriber;
 use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
+use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -13,8 +14,9 @@ use std::marker::PhantomData;
 
 /// Messages that a receiver may be behind before it loses the oldest.
 pub(crate) const BUFFER: usize = 256;
-/// Messages of one sender that can be under way at once; address space only, until they are used.
-const UNDER_WAY: usize = 4096;
+/// Messages of one sender that can be under way at once: a buffer, which holds the same messages for
+/// every receiver, and what they have taken out. Each receiver pays some 4 KiB for each of them.
+const UNDER_WAY: usize = BUFFER + 2 * MAX_PROCESSES + 16;
 
 fn service(node: &IpcNode, name: &str) -> Result<PortFactory<Ipc, [u8], ()>, InstanceError> {
     let builder = node
@@ -35,12 +37,14 @@ fn service(node: &IpcNode, name: &str) -> Result<PortFactory<Ipc, [u8], ()>, Ins
 #[derive(Debug)]
 pub struct Publisher<T> {
     port: IpcPublisher<Ipc, [u8], ()>,
+    service: PortFactory<Ipc, [u8], ()>,
     message: PhantomData<fn(&T)>,
 }
 
 impl<T: Serialize> Publisher<T> {
     pub(crate) fn open(node: &IpcNode, name: &str) -> Result<Self, InstanceError> {
-        let port = service(node, name)?
+        let service = service(node, name)?;
+        let port = service
             .publisher_builder()
             .initial_max_slice_len(4096)
             .allocation_strategy(AllocationStrategy::PowerOfTwo)
@@ -50,8 +54,14 @@ impl<T: Serialize> Publisher<T> {
             .map_err(|e| ipc(&format!("channel `{name}`"), e))?;
         Ok(Self {
             port,
+            service,
             message: PhantomData,
         })
+    }
+
+    /// Whether anybody would get a message that is sent now.
+    pub(crate) fn has_listeners(&self) -> bool {
+        self.service.dynamic_config().number_of_subscribers() > 0
     }
 
     /// Sends a message to all who listen now.

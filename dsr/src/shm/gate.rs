@@ -6,9 +6,11 @@
 //! a lock makes it all of the time. The lock is one on the instance's folder, which leaves no file
 //! behind and is given back by the kernel when its holder dies.
 
-use super::{Instance, InstanceError, Ipc, IpcNode, ipc};
+use super::{Instance, InstanceError, IpcNode, ipc};
 use iceoryx2::config::Config;
+use iceoryx2::node::Node;
 use iceoryx2::prelude::{NodeBuilder, SignalHandlingMode};
+use iceoryx2::service::Service;
 use rustix::fs::{FlockOperation, flock};
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -85,19 +87,22 @@ pub(super) fn one_at_a_time<T>(node: &IpcNode, open: impl FnOnce() -> T) -> T {
     open()
 }
 
-fn node(config: &Config) -> Result<IpcNode, InstanceError> {
+fn node<S: Service>(config: &Config) -> Result<Node<S>, InstanceError> {
     NodeBuilder::new()
         .config(config)
         .signal_handling_mode(SignalHandlingMode::Disabled)
-        .create::<Ipc>()
+        .create::<S>()
         .map_err(|e| ipc("cannot join the instance", e))
 }
 
 /// Announces this process as a member of the instance. To be called inside the gate.
-pub(super) fn join(instance: &Instance, config: &Config) -> Result<IpcNode, InstanceError> {
+pub(super) fn join<S: Service>(
+    instance: &Instance,
+    config: &Config,
+) -> Result<Node<S>, InstanceError> {
     if !seal(instance)? {
         // The first node of an instance makes the file; this one is for that alone.
-        drop(node(config)?);
+        drop(node::<S>(config)?);
         seal(instance)?;
     }
     node(config)

@@ -6,14 +6,19 @@
 //! the user who started it can enter, and its shared memory carries a prefix of its own.
 
 mod arena;
+mod bare;
+mod bell;
 mod changes;
 mod channel;
 mod gate;
+mod segment;
 mod session;
 mod store;
 
+pub use bare::{BareClient, BareServer};
 pub use changes::{Changes, Update};
 pub use channel::{Publisher, Subscriber};
+pub(crate) use segment::Segment;
 pub use session::{AttachError, ClockError, CommitError, Session, Tick};
 pub use store::{Store, StoreError};
 
@@ -25,12 +30,13 @@ use iceoryx2::prelude::{
     CallbackProgression, FileName, LogLevel, NodeState, Path as IpcPath, SemanticString,
     ServiceName, ipc_threadsafe, set_log_level,
 };
+use iceoryx2::service::Service;
 use std::fs;
 use std::hash::Hasher;
 use std::io;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use thiserror::Error;
 
 /// iceoryx2's flavour that lets a snapshot be read from any thread.
@@ -299,6 +305,10 @@ impl Instance {
 
     /// Announces this process as a member of the instance.
     pub(crate) fn join(&self) -> Result<IpcNode, InstanceError> {
+        self.join_as()
+    }
+
+    fn join_as<S: Service>(&self) -> Result<iceoryx2::node::Node<S>, InstanceError> {
         set_log_level(LogLevel::Fatal);
         let gate = Gate::enter(self)?;
         if gate.is_none() {
@@ -331,6 +341,23 @@ pub(crate) fn wait(
 /// How much shared memory the host has left, in bytes.
 pub(crate) fn free_bytes() -> u64 {
     rustix::fs::statvfs(SHARED_MEMORY).map_or(0, |s| s.f_bavail * s.f_frsize)
+}
+
+#[allow(
+    clippy::disallowed_methods,
+    reason = "waiting for another process takes the host's clock"
+)]
+fn now() -> Instant {
+    Instant::now()
+}
+
+/// Waits where nobody could wake the process.
+#[allow(
+    clippy::disallowed_methods,
+    reason = "before there is a store there is nothing to wait on"
+)]
+fn pause(nap: Duration) {
+    std::thread::sleep(nap);
 }
 
 fn ipc(what: &str, error: impl std::fmt::Display) -> InstanceError {

@@ -3,67 +3,41 @@
 //! a snapshot is of the newest graph that this process can see, and that a restarted store is
 //! found again without the caller's doing.
 
+mod commit;
+
+pub use commit::CommitError;
+pub(super) use commit::{ANSWERS, Request, requests};
+
+use commit::{ASKED, SPIN};
+
 use super::arena::ArenaSubscriber;
 use super::changes::Changes;
 use super::{
-    Instance, InstanceError, Ipc, IpcNode, MAX_PROCESSES, Publisher, Subscriber, ipc,
-    one_at_a_time, service_name, wait,
+    Instance, InstanceError, Ipc, IpcNode, MAX_PROCESSES, Publisher, Subscriber, ipc, now,
+    one_at_a_time, pause, service_name, wait,
 };
 use crate::arena::Arena;
 use crate::arena::record;
-use crate::{
-    Commit, Durability, Epoch, Filter, ReadError, Refusal, Schema, Snapshot, Time, Transaction,
-    Version,
-};
+use crate::{Epoch, Filter, ReadError, Schema, Snapshot, Time};
 use iceoryx2::port::client::Client;
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
-use iceoryx2::service::port_factory::{event as event_factory, request_response};
+use iceoryx2::service::port_factory::event as event_factory;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
 use std::sync::Arc;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use thiserror::Error;
 
 pub(super) const CHANGES: &str = "graph/changes";
-pub(super) const COMMITS_EVENT: &str = "graph/commits";
 pub(super) const REQUESTS_EVENT: &str = "graph/wake";
-const REQUESTS: &str = "graph/requests";
 const CLOCK: &str = "clock";
 const CLOCK_EVENT: &str = "clock/tick";
 
 /// How long a store may take to answer before the asker gives up.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// How often an asker looks whether its request has to be sent again.
-const RETRY: Duration = Duration::from_millis(250);
-
-/// A transaction on its way to the store.
-#[derive(Debug, Serialize, Deserialize)]
-pub(super) struct Request {
-    /// Which session asks.
-    pub(super) client: u64,
-    /// The how-manyeth request of it: a repeated number is a repeated request.
-    pub(super) sequence: u64,
-    pub(super) agent: String,
-    pub(super) time: Time,
-    pub(super) transaction: Transaction,
-}
-
-/// Requests and answers are bytes: see [`Request`].
-type RequestFactory = request_response::PortFactory<Ipc, [u8], (), [u8], ()>;
-
-pub(super) fn requests(node: &IpcNode) -> Result<RequestFactory, InstanceError> {
-    let builder = node
-        .service_builder(&service_name(REQUESTS)?)
-        .request_response::<[u8], [u8]>()
-        .max_servers(2)
-        .max_clients(MAX_PROCESSES)
-        .max_nodes(MAX_PROCESSES)
-        .max_active_requests_per_client(4);
-    one_at_a_time(node, || builder.open_or_create()).map_err(|e| ipc("the store's requests", e))
-}
-
 pub(super) fn event(
     node: &IpcNode,
     name: &str,
@@ -96,37 +70,6 @@ pub enum AttachError {
     Read(#[from] ReadError),
 }
 
-/// Why a commit did not come about, or may not have.
-#[derive(Debug, Error)]
-pub enum CommitError {
-    /// The store said no: nothing was changed.
-    #[error(transparent)]
-    Refused(#[from] Refusal),
-    /// No store answered in time; whether the transaction was applied is in the next snapshot.
-    #[error("the store did not answer within {} s", PATIENCE.as_secs())]
-    NoAnswer,
-    /// The transaction was applied, and everybody sees it, but the store could not bring it to the
-    /// disk.
-    #[error("version {version} was committed, but could not be written to disk")]
-    NotDurable {
-        /// The version that it made.
-        version: Version,
-    },
-    /// The store was restarted meanwhile; whether the transaction was applied is in the next
-    /// snapshot.
-    #[error("the store was restarted before it answered")]
-    StoreRestarted,
-    /// The instance cannot be used.
-    #[error(transparent)]
-    Attach(#[from] AttachError),
-}
-
-impl From<InstanceError> for CommitError {
-    fn from(error: InstanceError) -> Self {
-        Self::Attach(error.into())
-    }
-}
-
 /// Why there is no tick.
 #[derive(Debug, Error)]
 pub enum ClockError {
@@ -153,10 +96,12 @@ pub struct Session {
     schema: Option<(Epoch, u64, Arc<Schema>)>,
     client: Client<Ipc, [u8], (), [u8], ()>,
     wake_store: Notifier<Ipc>,
-    answers: Listener<Ipc>,
     clock: Option<(Listener<Ipc>, Subscriber<Tick>)>,
     id: u64,
     sequence: u64,
+    spin: Duration,
+    /// Where requests are put together; empty between uses.
+    scratch: Vec<u8>,
     // Dropped last: the ports above belong to it.
     node: IpcNode,
 }
@@ -175,16 +120,14 @@ impl Session {
             .initial_max_slice_len(4096)
             .allocation_strategy(AllocationStrategy::PowerOfTwo)
             .backpressure_strategy(BackpressureStrategy::DiscardData)
+            // The store may still read one that was sent again.
+            .override_request_preallocation(|worst| worst.min(2 * ASKED))
             .create()
             .map_err(|e| ipc("the store's client", e))?;
         let wake_store = event(&node, REQUESTS_EVENT)?
             .notifier_builder()
             .create()
             .map_err(|e| ipc("the store's bell", e))?;
-        let answers = event(&node, COMMITS_EVENT)?
-            .listener_builder()
-            .create()
-            .map_err(|e| ipc("the listener for commits", e))?;
         let session = Self {
             instance: instance.clone(),
             agent: agent.to_owned(),
@@ -192,10 +135,11 @@ impl Session {
             schema: None,
             client,
             wake_store,
-            answers,
             clock: None,
             id: new_session_id(),
             sequence: 0,
+            spin: SPIN,
+            scratch: Vec::new(),
             node,
         };
         session.ring();
@@ -236,9 +180,15 @@ impl Session {
             }
             self.ring();
             let nap = left.min(Duration::from_millis(5));
-            wait(&self.answers, nap, "waiting for the store")?;
+            pause(nap);
         }
         Ok(())
+    }
+
+    /// How long [`Self::commit`] looks for the answer of a store that is awake before it sleeps:
+    /// longer is faster where there are processors to spare, zero burns nothing.
+    pub fn set_spin(&mut self, spin: Duration) {
+        self.spin = spin;
     }
 
     /// The name that this process goes by.
@@ -320,95 +270,18 @@ impl Session {
         }
     }
 
-    /// Asks the store for a change and waits for its answer. A request that got lost is sent
-    /// again; the store applies it once.
-    ///
-    /// # Errors
-    /// [`CommitError`].
-    pub fn commit(&mut self, transaction: &Transaction, time: Time) -> Result<Commit, CommitError> {
-        let epoch = self.epoch()?;
-        self.sequence += 1;
-        let request = Request {
-            client: self.id,
-            sequence: self.sequence,
-            agent: self.agent.clone(),
-            time,
-            transaction: transaction.clone(),
-        };
-        let bytes = postcard::to_stdvec(&request).map_err(|e| ipc("encoding a request", e))?;
-        let deadline = now() + PATIENCE;
-        while now() < deadline {
-            let loan = self.client.loan_slice_uninit(bytes.len());
-            let loan = loan.map_err(|e| ipc("sending a request", e))?;
-            let pending = loan.write_from_slice(&bytes).send();
-            let pending = pending.map_err(|e| ipc("sending a request", e))?;
-            self.ring();
-            let retry = now() + RETRY;
-            loop {
-                if let Some(answer) = pending
-                    .receive()
-                    .map_err(|e| ipc("the store's answer", e))?
-                {
-                    let answer: Result<Commit, Refusal> = postcard::from_bytes(answer.payload())
-                        .map_err(|e| ipc("the store's answer", e))?;
-                    let commit = answer?;
-                    if transaction.durability == Durability::OnDisk && !commit.durable {
-                        let version = commit.version;
-                        return Err(CommitError::NotDurable { version });
-                    }
-                    return Ok(commit);
-                }
-                let left = retry.saturating_duration_since(now());
-                if left.is_zero() {
-                    break;
-                }
-                wait(&self.answers, left, "waiting for an answer")?;
-            }
-            if self.epoch()? != epoch {
-                return Err(CommitError::StoreRestarted);
-            }
-        }
-        Err(CommitError::NoAnswer)
-    }
-
-    /// As [`Self::commit`], for agents that decide anew from the next snapshot: does nothing for an
-    /// empty transaction, logs a refusal or a lost store, and goes on.
-    ///
-    /// # Errors
-    /// [`AttachError`] where there is nothing to go on with.
-    pub fn submit(
-        &mut self,
-        transaction: &Transaction,
-        time: Time,
-    ) -> Result<Option<Commit>, AttachError> {
-        if transaction.is_empty() {
-            return Ok(None);
-        }
-        match self.commit(transaction, time) {
-            Ok(commit) => Ok(Some(commit)),
-            Err(CommitError::Attach(error @ AttachError::Instance(_))) => Err(error),
-            Err(error) => {
-                tracing::warn!(%time, "{error}");
-                Ok(None)
-            }
-        }
-    }
-
     /// Follows the commits that pass `filter`, from now on.
     ///
     /// # Errors
     /// [`AttachError`].
     pub fn changes(&mut self, filter: Filter) -> Result<Changes, AttachError> {
         let subscriber = Subscriber::open(&self.node, CHANGES)?;
-        let listener = event(&self.node, COMMITS_EVENT)?
-            .listener_builder()
-            .create()
-            .map_err(|e| ipc("the listener for commits", e))?;
         let epoch = self.epoch()?;
         let seen = self.snapshot()?.version();
         Ok(Changes {
             subscriber,
-            listener,
+            waiting: VecDeque::new(),
+            current: self.arena.current.clone(),
             filter,
             epoch,
             seen,
@@ -476,14 +349,6 @@ impl Session {
         wait(listener, patience, "waiting for a tick")?;
         Ok(ticks.newest()?)
     }
-}
-
-#[allow(
-    clippy::disallowed_methods,
-    reason = "waiting for another process takes the host's clock"
-)]
-fn now() -> Instant {
-    Instant::now()
 }
 
 /// A number that no other session has: the process and the time.

@@ -2,21 +2,21 @@
 //! everybody what changed. It guarantees that a request that was answered is not applied again.
 
 use super::arena::ArenaPublisher;
-use super::session::{CHANGES, COMMITS_EVENT, REQUESTS_EVENT, Request, event, requests};
-use super::{Instance, InstanceError, Ipc, IpcNode, Publisher, ipc, wait};
+use super::session::{ANSWERS, CHANGES, REQUESTS_EVENT, Request, event, requests};
+use super::{Instance, InstanceError, Ipc, IpcNode, Publisher, bell, ipc, now, wait};
 use crate::arena::allocator::Full;
 use crate::graph::Image;
 use crate::state::Keeper;
 use crate::{
-    Change, Commit, Durability, Epoch, Graph, Refusal, Schema, State, StateError, Time, Transaction,
+    Change, Commit, Durability, Epoch, Graph, Refusal, Schema, State, StateError, Time,
+    Transaction, Version,
 };
 use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::port::listener::Listener;
-use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::server::Server;
 use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
 use std::collections::BTreeMap;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use thiserror::Error;
 
 /// Why a store cannot start or go on.
@@ -39,10 +39,31 @@ pub enum StoreError {
     Thread(std::io::Error),
 }
 
-/// An answer as it was given.
+/// What became of a transaction.
 type Answer = Result<Commit, Refusal>;
 /// A request that awaits its answer.
 type Asker = ActiveRequest<Ipc, [u8], (), [u8], ()>;
+
+/// What became of a client's last request.
+#[derive(Debug)]
+struct Answered {
+    sequence: u64,
+    answers: Vec<Answer>,
+}
+
+/// Who is to be told once version `last` is on disk.
+#[derive(Debug)]
+struct Waiting {
+    request: Asker,
+    client: u64,
+    sequence: u64,
+    last: Version,
+}
+
+/// How long the store looks for the next request before it sleeps, unless told otherwise.
+const SPIN: Duration = Duration::from_micros(50);
+/// How often a store that does not come to sleep looks for processes that joined.
+const NEWCOMERS: Duration = Duration::from_millis(1);
 
 /// The store of an instance: one process holds it, and it alone writes the graph.
 #[derive(Debug)]
@@ -51,15 +72,22 @@ pub struct Store {
     arena: ArenaPublisher,
     server: Server<Ipc, [u8], (), [u8], ()>,
     wake: Listener<Ipc>,
-    commits: Notifier<Ipc>,
-    changes: Publisher<Change>,
-    /// The last request of each client, with its answer.
-    answered: BTreeMap<u64, (u64, Answer)>,
+    changes: Publisher<Vec<Change>>,
+    /// Changes that were committed and not sent.
+    unsent: Vec<Change>,
+    /// The last request of each client.
+    answered: BTreeMap<u64, Answered>,
+    /// Where answers are put together; empty between uses.
+    scratch: Vec<u8>,
     last_time: Time,
     keeper: Option<Keeper>,
     durability: Durability,
     /// Who is to be told of a commit once it is on disk.
-    waiting: Vec<(Asker, Commit)>,
+    waiting: Vec<Waiting>,
+    spin: Duration,
+    /// Until when to look for the next request.
+    awake_until: Instant,
+    newcomers_at: Instant,
     // Dropped last: the ports above belong to it.
     node: IpcNode,
 }
@@ -84,16 +112,13 @@ impl Store {
             .initial_max_slice_len(1024)
             .allocation_strategy(AllocationStrategy::PowerOfTwo)
             .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .override_response_preallocation(|worst| worst.min(ANSWERS))
             .create()
             .map_err(|e| ipc("the store's server", e))?;
         let wake = event(&node, REQUESTS_EVENT)?
             .listener_builder()
             .create()
             .map_err(|e| ipc("the store's listener", e))?;
-        let commits = event(&node, COMMITS_EVENT)?
-            .notifier_builder()
-            .create()
-            .map_err(|e| ipc("the store's notifier", e))?;
         let changes = Publisher::open(&node, CHANGES)?;
         let answered = BTreeMap::new();
         let last_time = Time::default();
@@ -102,13 +127,17 @@ impl Store {
             arena,
             server,
             wake,
-            commits,
             changes,
+            unsent: Vec::new(),
             answered,
+            scratch: Vec::new(),
             last_time,
             keeper: None,
             durability: Durability::InMemory,
             waiting: Vec::new(),
+            spin: SPIN,
+            awake_until: now(),
+            newcomers_at: now(),
             node,
         })
     }
@@ -164,7 +193,10 @@ impl Store {
     /// # Errors
     /// [`Refusal`].
     pub fn commit(&mut self, transaction: &Transaction, time: Time) -> Result<Commit, Refusal> {
-        self.decide(transaction, "store", time)
+        let answer = self.decide(transaction, "store", time);
+        self.tell();
+        bell::ring(self.graph.arena());
+        answer
     }
 
     fn decide(&mut self, transaction: &Transaction, agent: &str, time: Time) -> Answer {
@@ -175,14 +207,29 @@ impl Store {
             self.can_keep()?;
         }
         let (commit, change) = self.graph.commit(transaction, agent, self.last_time)?;
-        if let Err(error) = self.changes.send(&change) {
-            // The commit stands; who listens sees the gap and reads the snapshot.
-            tracing::warn!("change {} was not sent: {error}", commit.version);
-        }
         if let Some(keeper) = &self.keeper {
             keeper.note(&change, self.graph.snapshot(), durable);
         }
+        self.unsent.push(change);
         Ok(commit)
+    }
+
+    /// Sends what was committed to whoever follows.
+    fn tell(&mut self) {
+        let changes = std::mem::take(&mut self.unsent);
+        if changes.is_empty() || !self.changes.has_listeners() {
+            return;
+        }
+        if let Err(error) = self.changes.send(&changes) {
+            // The commits stand; who listens sees the gap and reads the snapshot.
+            tracing::warn!("{} changes were not sent: {error}", changes.len());
+        }
+    }
+
+    /// How long the store looks for the next request before it sleeps: longer answers bursts
+    /// faster, zero burns nothing.
+    pub fn set_spin(&mut self, spin: Duration) {
+        self.spin = spin;
     }
 
     /// Whether the commit is to be acknowledged only once it is on disk.
@@ -202,9 +249,9 @@ impl Store {
         }
     }
 
-    /// Tells those who waited for it that their commit is on disk, or that it will not be.
+    /// Tells those who waited for it that their commits are on disk, or that they will not be.
     fn answer_waiting(&mut self) -> Result<usize, InstanceError> {
-        let Some(keeper) = &self.keeper else {
+        let Some(keeper) = self.keeper.as_ref().filter(|_| !self.waiting.is_empty()) else {
             return Ok(0);
         };
         // Looked at before what is durable: what was written before a failure counts.
@@ -213,23 +260,75 @@ impl Store {
         let before = self.waiting.len();
         let (told, waiting) = std::mem::take(&mut self.waiting)
             .into_iter()
-            .partition(|(_, commit)| failed || commit.version <= durable);
+            .partition(|asker| failed || asker.last <= durable);
         self.waiting = waiting;
-        for (asker, mut commit) in told {
-            commit.durable = commit.version <= durable;
-            reply(&asker, &Ok(commit))?;
+        let told: Vec<Waiting> = told;
+        for asker in told {
+            if let Some(answered) = self.answered.get_mut(&asker.client)
+                && answered.sequence == asker.sequence
+            {
+                for commit in answered.answers.iter_mut().flatten() {
+                    commit.durable = commit.version <= durable;
+                }
+                reply(&asker.request, &answered.answers, &mut self.scratch)?;
+            }
         }
         Ok(before - self.waiting.len())
     }
 
     /// Answers every request that has come, waiting up to `patience` for the first. How many.
     ///
+    /// After a request the store looks for the next one for a short while (see
+    /// [`Self::set_spin`]); then it sleeps until somebody wakes it.
+    ///
     /// # Errors
     /// [`StoreError::Instance`] where the instance's shared memory is gone.
     pub fn serve(&mut self, patience: Duration) -> Result<usize, StoreError> {
         self.graph.announce();
-        wait(&self.wake, patience, "waiting for requests")?;
+        loop {
+            let served = self.answer_all()?;
+            let time = now();
+            if served > 0 {
+                self.awake_until = time + self.spin;
+            }
+            if time >= self.newcomers_at {
+                self.newcomers_at = time + NEWCOMERS;
+                self.arena.serve_newcomers();
+            }
+            if served > 0 {
+                return Ok(served);
+            }
+            if time >= self.awake_until {
+                break;
+            }
+            std::hint::spin_loop();
+        }
+        self.sleep(patience)?;
         self.arena.serve_newcomers();
+        let served = self.answer_all()?;
+        if served > 0 {
+            self.awake_until = now() + self.spin;
+        }
+        Ok(served)
+    }
+
+    /// Sleeps until somebody rings, for `patience` at the most.
+    fn sleep(&mut self, patience: Duration) -> Result<(), StoreError> {
+        let arena = self.graph.arena();
+        // Who sends a request after this sees that it must ring; what was sent before is seen here.
+        arena.set_asleep(true);
+        let waiting = self.server.has_requests();
+        let slept = match waiting {
+            Ok(false) => wait(&self.wake, patience, "waiting for requests"),
+            Ok(true) => Ok(()),
+            Err(error) => Err(ipc("looking for requests", error)),
+        };
+        arena.set_asleep(false);
+        Ok(slept?)
+    }
+
+    /// Answers every request that is there.
+    fn answer_all(&mut self) -> Result<usize, StoreError> {
         let mut served = self.answer_waiting()?;
         while let Some(active) = self
             .server
@@ -240,30 +339,49 @@ impl Store {
             let request = match postcard::from_bytes::<Request>(active.payload()) {
                 Ok(request) => request,
                 Err(error) => {
-                    reply(&active, &Err(Refusal::Malformed(error.to_string())))?;
+                    let refusal = [Answer::Err(Refusal::Malformed(error.to_string()))];
+                    reply(&active, &refusal, &mut self.scratch)?;
                     continue;
                 }
             };
-            let answer = match self.answered.get(&request.client) {
-                Some((last, answer)) if *last == request.sequence => answer.clone(),
-                _ => {
-                    let answer = self.decide(&request.transaction, &request.agent, request.time);
-                    let entry = (request.sequence, answer.clone());
-                    self.answered.insert(request.client, entry);
-                    answer
-                }
+            let known = self.answered.get(&request.client);
+            if known.is_none_or(|known| known.sequence != request.sequence) {
+                let transactions = request.transactions.iter();
+                let answers = transactions
+                    .map(|transaction| self.decide(transaction, &request.agent, request.time))
+                    .collect();
+                // Before the answer: who goes on when it has it finds the changes there.
+                self.tell();
+                let answered = Answered {
+                    sequence: request.sequence,
+                    answers,
+                };
+                self.answered.insert(request.client, answered);
+            }
+            let Some(answered) = self.answered.get(&request.client) else {
+                continue;
             };
-            match answer {
-                Ok(commit) if self.durability_of(&request.transaction) => {
-                    self.waiting.push((active, commit));
-                }
-                answer => reply(&active, &answer)?,
+            let durable = request
+                .transactions
+                .iter()
+                .any(|transaction| self.durability_of(transaction));
+            let last = answered
+                .answers
+                .iter()
+                .flatten()
+                .map(|commit| commit.version);
+            match last.max().filter(|_| durable) {
+                Some(last) => self.waiting.push(Waiting {
+                    request: active,
+                    client: request.client,
+                    sequence: request.sequence,
+                    last,
+                }),
+                None => reply(&active, &answered.answers, &mut self.scratch)?,
             }
         }
-        if served > 0
-            && let Err(error) = self.commits.notify()
-        {
-            tracing::debug!("waking the agents: {error}");
+        if served > 0 {
+            bell::ring(self.graph.arena());
         }
         Ok(served)
     }
@@ -282,13 +400,16 @@ impl Store {
 }
 
 /// Answers a request.
-fn reply(asker: &Asker, answer: &Answer) -> Result<(), InstanceError> {
-    let bytes = postcard::to_stdvec(answer).map_err(|e| ipc("encoding an answer", e))?;
+fn reply(asker: &Asker, answers: &[Answer], scratch: &mut Vec<u8>) -> Result<(), InstanceError> {
+    let mut bytes = std::mem::take(scratch);
+    bytes.clear();
+    let bytes = postcard::to_extend(answers, bytes).map_err(|e| ipc("encoding an answer", e))?;
     match asker.loan_slice_uninit(bytes.len()) {
         // A client that went away meanwhile does not hear; that is its affair.
         Ok(response) => drop(response.write_from_slice(&bytes).send()),
         Err(error) => tracing::warn!("an answer was not sent: {error}"),
     }
+    *scratch = bytes;
     Ok(())
 }
 

@@ -2,7 +2,8 @@
 //! say [`ReadError::SnapshotTooOld`].
 
 use super::{NodeIds, Scan, Snapshot};
-use crate::arena::record::{self, AttributeRecord};
+use crate::arena::record;
+use crate::arena::table::{self, AttributeRecord, Place};
 use crate::arena::{Address, ReadError, Word};
 use crate::{AttributeId, EdgeKey, LabelId, NodeId, Time, TypeId, Value, Version, WriterId};
 use std::ops::Deref;
@@ -12,6 +13,8 @@ use std::ops::Deref;
 pub struct Element<'a> {
     snapshot: &'a Snapshot,
     address: Address,
+    /// Of its record.
+    words: &'a [Word],
     layout: Layout,
 }
 
@@ -81,10 +84,8 @@ pub struct Attribute {
 
 impl<'a> Element<'a> {
     pub(super) fn word(&self, index: usize) -> Result<u64, ReadError> {
-        let words = self.snapshot.arena.from(self.address);
-        let word = words.and_then(|words| words.get(index));
-        self.snapshot
-            .genuine(word.map(Word::load).ok_or(self.address))
+        let word = self.words.get(index).map(Word::load);
+        self.snapshot.genuine(word.ok_or(self.address))
     }
 
     /// The commit that last changed the attributes or, of a node, the type; or made it.
@@ -95,44 +96,41 @@ impl<'a> Element<'a> {
         self.word(self.layout.version).map(Version)
     }
 
-    /// The rows of the table of attributes, not yet known to be genuine.
-    fn rows(&self) -> Result<&'a [Word], ReadError> {
-        let words = self.snapshot.arena.from(self.address);
-        let rows = words.and_then(|words| {
-            let kind = words.get(self.layout.kind)?.load();
-            record::table(words, self.layout.attributes, kind)
-        });
-        rows.ok_or_else(|| self.snapshot.broken(self.address))
+    /// The table of attributes and its rows, not yet known to be genuine.
+    #[inline]
+    fn table(&self) -> Option<(&'a [Word], &'a [Word])> {
+        let kind = self.words.get(self.layout.kind)?.load();
+        let table = self.words.get(self.layout.attributes..)?;
+        Some((table, table.get(..table::count(kind))?))
     }
 
-    fn find_row(&self, name: AttributeId) -> Result<Option<Address>, ReadError> {
-        let mut rows = self.rows()?.iter();
-        let row = rows.find_map(|word| {
-            let (attribute, at) = record::split_row(word.load());
-            (attribute == name.0).then_some(at)
-        });
-        self.snapshot.genuine(Ok(row))
+    #[inline]
+    fn decode(&self, table: &[Word], row: u64) -> Result<AttributeRecord, Address> {
+        match table::place_of(row) {
+            Place::InTable(offset) => table
+                .get(offset..)
+                .and_then(AttributeRecord::decode)
+                .ok_or(self.address),
+            Place::At(address) => AttributeRecord::read(&self.snapshot.arena, address),
+        }
     }
 
     /// One attribute, if it is there.
     ///
     /// # Errors
     /// [`ReadError`].
+    #[inline]
     pub fn attribute(&self, name: AttributeId) -> Result<Option<Attribute>, ReadError> {
-        let row = self.find_row(name)?;
-        row.map(|at| self.read(name, at)).transpose()
-    }
-
-    fn read(&self, name: AttributeId, address: Address) -> Result<Attribute, ReadError> {
-        let read = AttributeRecord::read(&self.snapshot.arena, address);
-        let read = self.snapshot.genuine(read)?;
-        Ok(Attribute {
-            name,
-            value: read.value,
-            version: Version(read.version),
-            time: Time::from_nanoseconds(read.time),
-            writer: WriterId(read.writer),
-        })
+        let (table, rows) = self
+            .table()
+            .ok_or_else(|| self.snapshot.broken(self.address))?;
+        let row = rows
+            .iter()
+            .map(Word::load)
+            .find(|&row| table::name_of(row) == name.0);
+        let record = row.map(|row| self.decode(table, row)).transpose();
+        let record = self.snapshot.genuine(record)?;
+        Ok(record.map(|record| written(name, record)))
     }
 
     /// The values of an attribute that are kept, newest first: as many as the schema's `history`
@@ -142,26 +140,40 @@ impl<'a> Element<'a> {
     /// [`ReadError`].
     pub fn history(&self, name: AttributeId) -> Result<Vec<Attribute>, ReadError> {
         let mut history = Vec::new();
-        if let Some(address) = self.find_row(name)? {
-            self.append_history(name, address, &mut history)?;
+        let (table, rows) = self
+            .table()
+            .ok_or_else(|| self.snapshot.broken(self.address))?;
+        let mut rows = rows.iter().map(Word::load);
+        if let Some(row) = rows.find(|&row| table::name_of(row) == name.0) {
+            self.append_history(table, row, &mut history)?;
         }
+        self.snapshot.check()?;
         Ok(history)
     }
 
     fn append_history(
         &self,
-        name: AttributeId,
-        address: Address,
+        table: &[Word],
+        row: u64,
         history: &mut Vec<Attribute>,
     ) -> Result<(), ReadError> {
-        history.push(self.read(name, address)?);
+        let name = AttributeId(table::name_of(row));
+        let mut append = |row| {
+            let record = self.snapshot.genuine(self.decode(table, row))?;
+            history.push(written(name, record));
+            Ok::<_, ReadError>(())
+        };
+        append(row)?;
+        let Place::At(address) = table::place_of(row) else {
+            return Ok(());
+        };
         let arena = &self.snapshot.arena;
         let older = |at| AttributeRecord::older(arena, at).unwrap_or_default();
         // Where the chain ends is up to its newest record: what the oldest leads to is gone.
         let (mut count, mut address) = older(address);
         self.snapshot.check()?;
         while count > 0 {
-            history.push(self.read(name, address)?);
+            append(table::row(name.0, Place::At(address)))?;
             (_, address) = older(address);
             count -= 1;
         }
@@ -170,12 +182,13 @@ impl<'a> Element<'a> {
 
     /// All attributes by id of their names, each after the older values of its history.
     pub(crate) fn recorded(&self) -> Result<Vec<Attribute>, ReadError> {
-        let rows: Vec<u64> = self.rows()?.iter().map(Word::load).collect();
-        self.snapshot.check()?;
+        let (table, rows) = self
+            .table()
+            .ok_or_else(|| self.snapshot.broken(self.address))?;
         let mut recorded = Vec::new();
-        for (name, address) in rows.into_iter().map(record::split_row) {
+        for row in rows {
             let from = recorded.len();
-            self.append_history(AttributeId(name), address, &mut recorded)?;
+            self.append_history(table, row.load(), &mut recorded)?;
             recorded[from..].reverse();
         }
         Ok(recorded)
@@ -197,11 +210,26 @@ impl<'a> Element<'a> {
     /// # Errors
     /// [`ReadError`].
     pub fn attributes(&self) -> Result<Vec<Attribute>, ReadError> {
-        let rows: Vec<u64> = self.rows()?.iter().map(Word::load).collect();
-        self.snapshot.check()?;
-        let rows = rows.into_iter().map(record::split_row);
-        rows.map(|(name, at)| self.read(AttributeId(name), at))
+        let (table, rows) = self
+            .table()
+            .ok_or_else(|| self.snapshot.broken(self.address))?;
+        rows.iter()
+            .map(|row| {
+                let row = row.load();
+                let record = self.snapshot.genuine(self.decode(table, row))?;
+                Ok(written(AttributeId(table::name_of(row)), record))
+            })
             .collect()
+    }
+}
+
+fn written(name: AttributeId, record: AttributeRecord) -> Attribute {
+    Attribute {
+        name,
+        value: record.value,
+        version: Version(record.version),
+        time: Time::from_nanoseconds(record.time),
+        writer: WriterId(record.writer),
     }
 }
 
@@ -209,12 +237,14 @@ impl<'a> Node<'a> {
     pub(super) fn at(
         snapshot: &'a Snapshot,
         address: Address,
+        words: &'a [Word],
         id: NodeId,
         type_id: TypeId,
     ) -> Self {
         let element = Element {
             snapshot,
             address,
+            words,
             layout: NODE,
         };
         Self {
@@ -345,6 +375,8 @@ impl<'a> Edge<'a> {
         let element = Element {
             snapshot,
             address,
+            // A place outside the arena is told by the first read.
+            words: snapshot.arena.from(address).unwrap_or(&[]),
             layout: EDGE,
         };
         Self { element, key }

@@ -3,7 +3,7 @@
 
 use super::{Work, read, touch};
 use crate::arena::Address;
-use crate::arena::record::{AttributeRecord, row, split_row};
+use crate::arena::table::{AttributeRecord, Place, Stored, Table};
 use crate::{AttributeId, NodeId, Owner, Refusal, Touch, TypeId, Value};
 
 impl Work<'_> {
@@ -49,18 +49,18 @@ impl Work<'_> {
     }
 
     /// The place in its index of an attribute in a node's table, where it has one.
-    pub(super) fn indexed_place(&self, rows: &[u64], name: &str) -> Result<Option<u64>, Refusal> {
+    pub(super) fn indexed_place(&self, table: &Table, name: &str) -> Result<Option<u64>, Refusal> {
         let attribute = self.schema().find_attribute(name);
         let Some(attribute) = attribute.filter(|&found| self.schema().has_index(found)) else {
             return Ok(None);
         };
-        let row = rows.iter().find(|&&row| split_row(row).0 == attribute.0);
-        row.map_or(Ok(None), |&row| self.place_of(row))
+        let place = table.find(attribute.0);
+        place.map_or(Ok(None), |place| self.place_of(table, place))
     }
 
-    /// The place of a row's value in an index.
-    pub(super) fn place_of(&self, row: u64) -> Result<Option<u64>, Refusal> {
-        let record = AttributeRecord::read(&self.graph.writer.arena, split_row(row).1);
+    /// The place in an index of an attribute's value.
+    pub(super) fn place_of(&self, table: &Table, place: Place) -> Result<Option<u64>, Refusal> {
+        let record = table.attribute(&self.graph.writer.arena, place);
         Ok(read(record)?.value.place())
     }
 
@@ -87,38 +87,36 @@ impl Work<'_> {
     /// Writes an attribute and enters it into a record's table.
     pub(super) fn set_row(
         &mut self,
-        rows: &mut Vec<u64>,
+        table: &mut Table,
         name: &str,
         value: &Value,
     ) -> Result<AttributeId, Refusal> {
         let attribute = self.attribute_id(name)?;
         self.schema().check_value(attribute, value)?;
-        let at = rows.partition_point(|&r| split_row(r).0 < attribute.0);
-        let old = rows.get(at).map(|&r| split_row(r));
-        let old = old.filter(|(found, _)| *found == attribute.0);
-        let older = match (self.schema().history(attribute), old) {
-            (0, old) => {
-                if let Some((_, old)) = old {
-                    self.retire_attribute(old);
-                }
-                None
-            }
-            (_, None) => Some((0, 0)),
-            (limit, Some((_, old))) => Some(self.next_older(old, limit)),
+        let place = table.find(attribute.0);
+        let older = match (self.schema().history(attribute), place) {
+            (0, _) => None,
+            (limit, Some(Place::At(old))) => Some(self.next_older(old, limit)),
+            _ => Some((0, 0)),
         };
-        let record = AttributeRecord {
-            value: value.clone(),
-            version: self.stamp.version,
-            time: self.stamp.time,
-            writer: self.stamp.writer,
-            older,
-        };
-        let address = self.graph.writer.write(&record.words());
-        let address = self.room(address)?;
-        if old.is_some() {
-            rows[at] = row(attribute.0, address);
+        let (stamp, writer) = (self.stamp, &mut self.graph.writer);
+        let mut words = std::mem::take(&mut writer.scratch);
+        words.clear();
+        let (version, time, writer_id) = (stamp.version, stamp.time, stamp.writer);
+        AttributeRecord::encode(&mut words, value, (version, time, writer_id), older);
+        // What may become history lies in a block of its own, to which the next record leads.
+        let stored = if older.is_none() && Table::holds(words.len()) {
+            Ok(Stored::InTable(&words))
         } else {
-            rows.insert(at, row(attribute.0, address));
+            writer.write(&words).map(Stored::At)
+        };
+        let gone = stored.map(|stored| table.set(attribute.0, stored));
+        writer.scratch = words;
+        let gone = self.room(gone)?;
+        if older.is_none()
+            && let Some(gone) = gone
+        {
+            self.retire_attribute(gone);
         }
         Ok(attribute)
     }
@@ -132,9 +130,9 @@ impl Work<'_> {
         match owner {
             Owner::Node(node) => {
                 let (address, mut record) = self.node(node)?;
-                let len = record.words().len();
-                let before = self.indexed_place(&record.rows, name)?;
-                let name = self.change_row(&mut record.rows, name, value)?;
+                let len = record.len();
+                let before = self.indexed_place(&record.table, name)?;
+                let name = self.change_row(&mut record.table, name, value)?;
                 let after = value.and_then(Value::place);
                 self.index_value(name, NodeId(record.id), before, after)?;
                 record.version = self.stamp.record;
@@ -150,8 +148,8 @@ impl Work<'_> {
             }
             Owner::Edge(edge) => {
                 let (key, address, mut record) = self.edge(edge)?;
-                let len = record.words().len();
-                let name = self.change_row(&mut record.rows, name, value)?;
+                let len = record.len();
+                let name = self.change_row(&mut record.table, name, value)?;
                 record.version = self.stamp.record;
                 self.put_edge(key, Some((address, len)), &record)?;
                 touch(&mut self.edges, key, (), Touch::Updated, Some(name));
@@ -162,17 +160,17 @@ impl Work<'_> {
 
     fn change_row(
         &mut self,
-        rows: &mut Vec<u64>,
+        table: &mut Table,
         name: &str,
         value: Option<&Value>,
     ) -> Result<AttributeId, Refusal> {
         let Some(value) = value else {
             let attribute = self.attribute_id(name)?;
-            if let Some(at) = rows.iter().position(|&r| split_row(r).0 == attribute.0) {
-                self.retire_attribute(split_row(rows.remove(at)).1);
+            if let Some(Place::At(address)) = table.remove(attribute.0) {
+                self.retire_attribute(address);
             }
             return Ok(attribute);
         };
-        self.set_row(rows, name, value)
+        self.set_row(table, name, value)
     }
 }

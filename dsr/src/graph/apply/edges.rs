@@ -2,7 +2,8 @@
 //! label and the counts per (label, type, type) agree on which there are.
 
 use super::{Work, read, touch};
-use crate::arena::record::{self, EdgeRecord, split_row};
+use crate::arena::record::{self, EdgeRecord};
+use crate::arena::table::Table;
 use crate::arena::{Address, tree};
 use crate::{EdgeKey, EdgeRef, LabelId, NodeId, Refusal, Touch, TypeId, Value};
 
@@ -54,10 +55,10 @@ impl Work<'_> {
                 to: to.id,
                 label: label.0,
                 version: 0,
-                rows: vec![],
+                table: Table::default(),
             },
         };
-        let len = record.words().len();
+        let len = record.len();
         record.version = self.stamp.record;
         let how = if existing.is_some() {
             Touch::Updated
@@ -66,7 +67,7 @@ impl Work<'_> {
         };
         touch(&mut self.edges, key, (), how, None);
         for (name, value) in attributes {
-            let name = self.set_row(&mut record.rows, name, value)?;
+            let name = self.set_row(&mut record.table, name, value)?;
             touch(&mut self.edges, key, (), Touch::Updated, Some(name));
         }
         self.put_edge(key, existing.map(|(_, address)| (address, len)), &record)?;
@@ -75,7 +76,7 @@ impl Work<'_> {
             let into = [u64::from(label.0), key.from.0];
             let into = tree::insert(&mut self.graph.writer, to.into, into, 0);
             to.into = self.room(into)?;
-            let len = to.words().len();
+            let len = to.len();
             self.put_node(Some((address, len)), &to)?;
             let directory = self.root.labels;
             self.root.labels = self.index(directory, label.0, [key.from.0, key.to.0], true)?;
@@ -92,11 +93,7 @@ impl Work<'_> {
         old: Option<(Address, usize)>,
         record: &EdgeRecord,
     ) -> Result<(), Refusal> {
-        let words = record.words();
-        let put = match old {
-            Some((address, len)) => self.graph.writer.replace(address, len, &words),
-            None => self.graph.writer.write(&words),
-        };
+        let put = self.graph.writer.put(old, |words| record.encode(words));
         let put = self.room(put)?;
         if old.is_some_and(|(address, _)| address == put) {
             return Ok(());
@@ -105,7 +102,7 @@ impl Work<'_> {
         let out = [u64::from(key.label.0), key.to.0];
         let out = tree::insert(&mut self.graph.writer, from.out, out, put);
         from.out = self.room(out)?;
-        let len = from.words().len();
+        let len = from.len();
         self.put_node(Some((address, len)), &from)
     }
 
@@ -116,19 +113,19 @@ impl Work<'_> {
         let found = tree::find(&self.graph.writer.arena, from.out, [label, key.to.0]);
         if let Some(edge) = read(found)? {
             let record = read(EdgeRecord::read(&self.graph.writer.arena, edge))?;
-            for &row in &record.rows {
-                self.retire_attribute(split_row(row).1);
+            for address in record.table.blocks() {
+                self.retire_attribute(address);
             }
-            self.graph.writer.retire(edge, record.words().len());
+            self.graph.writer.retire(edge, record.len());
         }
         let out = tree::remove(&mut self.graph.writer, from.out, [label, key.to.0]);
         from.out = self.room(out)?;
-        let len = from.words().len();
+        let len = from.len();
         self.put_node(Some((address, len)), &from)?;
         let (address, mut to) = self.node(&key.to.into())?;
         let into = tree::remove(&mut self.graph.writer, to.into, [label, key.from.0]);
         to.into = self.room(into)?;
-        let len = to.words().len();
+        let len = to.len();
         self.put_node(Some((address, len)), &to)?;
         let directory = self.root.labels;
         self.root.labels = self.index(directory, key.label.0, [key.from.0, key.to.0], false)?;

@@ -2,19 +2,25 @@
 //! and the edges that touch it never disagree.
 
 use super::{Work, damaged, read, touch};
-use crate::arena::record::{self, NodeRecord, split_row};
+use crate::arena::record::{self, NodeRecord};
+use crate::arena::table::Table;
 use crate::arena::{Address, tree, trie};
 use crate::value::hash;
 use crate::{AttributeId, NodeId, NodeRef, Refusal, SchemaError, Touch, TypeId, Value};
 
 impl Work<'_> {
     pub(super) fn find(&self, node: &NodeRef) -> Result<Option<NodeId>, Refusal> {
-        let snapshot = self.snapshot();
-        let found = match node {
-            NodeRef::Id(id) => snapshot.find_node(*id),
-            NodeRef::Name(name) => snapshot.find_node_by_name(name),
-        };
-        Ok(found.map_err(damaged)?.map(|node| node.id()))
+        match node {
+            NodeRef::Id(id) => {
+                let found = trie::find(&self.graph.writer.arena, self.root.nodes, id.0);
+                Ok(read(found)?.map(|_| *id))
+            }
+            NodeRef::Name(name) => {
+                let snapshot = self.snapshot();
+                let found = snapshot.find_node_by_name(name);
+                Ok(found.map_err(damaged)?.map(|node| node.id()))
+            }
+        }
     }
 
     pub(super) fn node(&self, node: &NodeRef) -> Result<(Address, NodeRecord), Refusal> {
@@ -35,12 +41,8 @@ impl Work<'_> {
         old: Option<(Address, usize)>,
         node: &NodeRecord,
     ) -> Result<(), Refusal> {
-        let words = node.words();
         let writer = &mut self.graph.writer;
-        let put = match old {
-            Some((address, len)) => writer.replace(address, len, &words),
-            None => writer.write(&words),
-        };
+        let put = writer.put(old, |words| node.encode(words));
         let put = put.and_then(|at| trie::insert(writer, self.root.nodes, node.id, at));
         self.root.nodes = self.room(put)?;
         Ok(())
@@ -76,12 +78,12 @@ impl Work<'_> {
             version: self.stamp.record,
             out: 0,
             into: 0,
-            rows: Vec::new(),
+            table: Table::default(),
         };
         touch(&mut self.nodes, id, type_id, Touch::Created, None);
         for (name, value) in attributes {
-            let before = self.indexed_place(&node.rows, name)?;
-            let name = self.set_row(&mut node.rows, name, value)?;
+            let before = self.indexed_place(&node.table, name)?;
+            let name = self.set_row(&mut node.table, name, value)?;
             self.index_value(name, id, before, value.place())?;
             touch(&mut self.nodes, id, type_id, Touch::Updated, Some(name));
         }
@@ -144,20 +146,22 @@ impl Work<'_> {
             self.delete_edge(edge)?;
         }
         let (address, node) = self.node(&id.into())?;
-        for &row in &node.rows {
-            let attribute = AttributeId(split_row(row).0);
+        for (name, place) in node.table.iter() {
+            let attribute = AttributeId(name);
             if self.schema().has_index(attribute) {
-                let place = self.place_of(row)?;
+                let place = self.place_of(&node.table, place)?;
                 self.index_value(attribute, id, place, None)?;
             }
-            self.retire_attribute(split_row(row).1);
+        }
+        for address in node.table.blocks() {
+            self.retire_attribute(address);
         }
         let name = read(record::read_blob(&self.graph.writer.arena, node.name))?;
         let hash = hash(&String::from_utf8_lossy(&name));
         let writer = &mut self.graph.writer;
         let words = record::blob_len(writer.arena(), node.name);
         writer.retire(node.name, words);
-        writer.retire(address, node.words().len());
+        writer.retire(address, node.len());
         let nodes = trie::remove(writer, self.root.nodes, id.0);
         let names = tree::remove(writer, self.root.names, [hash, id.0]);
         self.root.nodes = self.room(nodes)?;
@@ -184,7 +188,7 @@ impl Work<'_> {
         self.index_type(TypeId(node.type_id), id, false)?;
         self.index_type(type_id, id, true)?;
         self.recount_triples(id, TypeId(node.type_id), type_id)?;
-        let len = node.words().len();
+        let len = node.len();
         node.type_id = type_id.0;
         node.version = self.stamp.record;
         self.put_node(Some((address, len)), &node)?;

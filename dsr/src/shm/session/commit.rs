@@ -1,0 +1,207 @@
+//! How a session asks the store for changes: the requests, their way there and back, and what can
+//! come of them. It guarantees that a request which got lost is sent again, and applied once.
+
+use super::super::{
+    InstanceError, Ipc, IpcNode, MAX_PROCESSES, bell, ipc, now, one_at_a_time, service_name,
+};
+use super::{AttachError, PATIENCE, Session};
+use crate::{Commit, Durability, Refusal, Time, Transaction, Version};
+use iceoryx2::service::port_factory::request_response;
+use serde::{Deserialize, Serialize};
+use std::time::Duration;
+use thiserror::Error;
+
+const REQUESTS: &str = "graph/requests";
+/// Answers that can be under way at once. iceoryx2 would make room for thousands, which costs each
+/// client 14 MB of its own.
+pub(in crate::shm) const ANSWERS: usize = 2 * MAX_PROCESSES;
+/// Requests of one session that can be under way at once.
+pub(super) const ASKED: usize = 4;
+/// How often an asker looks whether its request has to be sent again.
+const RETRY: Duration = Duration::from_millis(250);
+/// How long a session looks for an answer before it sleeps, unless told otherwise.
+pub(super) const SPIN: Duration = Duration::from_micros(50);
+
+/// Transactions on their way to the store.
+#[derive(Debug, Deserialize)]
+pub(in crate::shm) struct Request {
+    /// Which session asks.
+    pub(in crate::shm) client: u64,
+    /// The how-manyeth request of it: a repeated number is a repeated request.
+    pub(in crate::shm) sequence: u64,
+    pub(in crate::shm) agent: String,
+    pub(in crate::shm) time: Time,
+    /// Each is applied whole or not at all, in this order.
+    pub(in crate::shm) transactions: Vec<Transaction>,
+}
+
+/// A [`Request`] as its sender has it.
+#[derive(Debug, Serialize)]
+struct Asked<'a> {
+    client: u64,
+    sequence: u64,
+    agent: &'a str,
+    time: Time,
+    transactions: &'a [Transaction],
+}
+
+/// Requests and answers are bytes: see [`Request`].
+type RequestFactory = request_response::PortFactory<Ipc, [u8], (), [u8], ()>;
+
+pub(in crate::shm) fn requests(node: &IpcNode) -> Result<RequestFactory, InstanceError> {
+    let builder = node
+        .service_builder(&service_name(REQUESTS)?)
+        .request_response::<[u8], [u8]>()
+        .max_servers(2)
+        .max_clients(MAX_PROCESSES)
+        .max_nodes(MAX_PROCESSES)
+        .max_active_requests_per_client(ASKED);
+    one_at_a_time(node, || builder.open_or_create()).map_err(|e| ipc("the store's requests", e))
+}
+
+/// Why a commit did not come about, or may not have.
+#[derive(Debug, Error)]
+pub enum CommitError {
+    /// The store said no: nothing was changed.
+    #[error(transparent)]
+    Refused(#[from] Refusal),
+    /// No store answered in time; whether the transaction was applied is in the next snapshot.
+    #[error("the store did not answer within {} s", PATIENCE.as_secs())]
+    NoAnswer,
+    /// The transaction was applied, and everybody sees it, but the store could not bring it to the
+    /// disk.
+    #[error("version {version} was committed, but could not be written to disk")]
+    NotDurable {
+        /// The version that it made.
+        version: Version,
+    },
+    /// The store was restarted meanwhile; whether the transaction was applied is in the next
+    /// snapshot.
+    #[error("the store was restarted before it answered")]
+    StoreRestarted,
+    /// The instance cannot be used.
+    #[error(transparent)]
+    Attach(#[from] AttachError),
+}
+
+impl From<InstanceError> for CommitError {
+    fn from(error: InstanceError) -> Self {
+        Self::Attach(error.into())
+    }
+}
+
+impl Session {
+    /// Asks the store for a change and waits for its answer. A request that got lost is sent
+    /// again; the store applies it once.
+    ///
+    /// # Errors
+    /// [`CommitError`].
+    pub fn commit(&mut self, transaction: &Transaction, time: Time) -> Result<Commit, CommitError> {
+        let answers = self.commit_each(std::slice::from_ref(transaction), time)?;
+        let Some(answer) = answers.into_iter().next() else {
+            return Err(InstanceError::Ipc("the store gave no answer".to_owned()).into());
+        };
+        let commit = answer?;
+        if transaction.durability == Durability::OnDisk && !commit.durable {
+            let version = commit.version;
+            return Err(CommitError::NotDurable { version });
+        }
+        Ok(commit)
+    }
+
+    /// As [`Self::commit`] for many transactions in one request, which is faster by far: each is
+    /// applied whole or refused by itself, makes a version of its own, and is answered, in the
+    /// order given. Refusing one does not stop the next. Where one asks to be on disk first, all wait
+    /// for it; [`Commit::durable`] says whether it is.
+    ///
+    /// # Errors
+    /// [`CommitError`], but not for a refusal.
+    pub fn commit_each(
+        &mut self,
+        transactions: &[Transaction],
+        time: Time,
+    ) -> Result<Vec<Result<Commit, Refusal>>, CommitError> {
+        self.sequence += 1;
+        let mut bytes = std::mem::take(&mut self.scratch);
+        bytes.clear();
+        let request = Asked {
+            client: self.id,
+            sequence: self.sequence,
+            agent: &self.agent,
+            time,
+            transactions,
+        };
+        let bytes =
+            postcard::to_extend(&request, bytes).map_err(|e| ipc("encoding a request", e))?;
+        let answer = self.ask(&bytes);
+        self.scratch = bytes;
+        let answers = answer?;
+        if answers.len() != transactions.len() {
+            return Err(InstanceError::Ipc("the store's answer is too short".to_owned()).into());
+        }
+        Ok(answers)
+    }
+
+    fn ask(&mut self, request: &[u8]) -> Result<Vec<Result<Commit, Refusal>>, CommitError> {
+        let (epoch, arena) = self.arena()?.ok_or_else(|| self.no_store())?;
+        let deadline = now() + PATIENCE;
+        while now() < deadline {
+            let loan = self.client.loan_slice_uninit(request.len());
+            let loan = loan.map_err(|e| ipc("sending a request", e))?;
+            let pending = loan.write_from_slice(request).send();
+            let pending = pending.map_err(|e| ipc("sending a request", e))?;
+            let asleep = arena.is_asleep();
+            if asleep {
+                self.ring();
+            }
+            let sent = now();
+            loop {
+                let heard = bell::listen(&arena);
+                if let Some(answer) = pending
+                    .receive()
+                    .map_err(|e| ipc("the store's answer", e))?
+                {
+                    let answers = postcard::from_bytes(answer.payload());
+                    return Ok(answers.map_err(|e| ipc("the store's answer", e))?);
+                }
+                let waited = now() - sent;
+                // A store that has to wake up first takes longer than is worth looking for.
+                if !asleep && waited < self.spin {
+                    std::hint::spin_loop();
+                    continue;
+                }
+                let Some(left) = RETRY.checked_sub(waited) else {
+                    break;
+                };
+                bell::sleep(&arena, heard, left);
+            }
+            if self.epoch()? != epoch {
+                return Err(CommitError::StoreRestarted);
+            }
+        }
+        Err(CommitError::NoAnswer)
+    }
+
+    /// As [`Self::commit`], for agents that decide anew from the next snapshot: does nothing for an
+    /// empty transaction, logs a refusal or a lost store, and goes on.
+    ///
+    /// # Errors
+    /// [`AttachError`] where there is nothing to go on with.
+    pub fn submit(
+        &mut self,
+        transaction: &Transaction,
+        time: Time,
+    ) -> Result<Option<Commit>, AttachError> {
+        if transaction.is_empty() {
+            return Ok(None);
+        }
+        match self.commit(transaction, time) {
+            Ok(commit) => Ok(Some(commit)),
+            Err(CommitError::Attach(error @ AttachError::Instance(_))) => Err(error),
+            Err(error) => {
+                tracing::warn!(%time, "{error}");
+                Ok(None)
+            }
+        }
+    }
+}
