@@ -1,8 +1,10 @@
 //! The command line: every verb with its flags. Parsing a flag does nothing but parse it.
 
+mod bench;
 mod mission;
 mod path;
 
+pub(crate) use bench::{Bench, BenchAction, BenchPeer};
 pub(crate) use mission::{Mission, MissionAction, SubmitMission};
 pub(crate) use path::{CostModel, Path, PathAlgorithm};
 
@@ -51,7 +53,7 @@ pub(crate) enum Verb {
     )]
     Mission(Mission),
     /// Measure how fast it is here
-    #[command(after_help = "Example:\n  cortex bench plan --json")]
+    #[command(after_help = "Example:\n  cortex bench graph --json")]
     Bench(Bench),
     /// Find the cheapest path over a grid map, or check a list of known ones
     #[command(
@@ -60,6 +62,8 @@ pub(crate) enum Verb {
         cortex path --grid house.wmap --model length_mean --from 80,197 --to 10,201"
     )]
     Path(Path),
+    #[command(hide = true)]
+    BenchPeer(BenchPeer),
 }
 
 /// Which running system.
@@ -380,24 +384,4 @@ fn seconds(text: &str) -> Result<f64, String> {
     } else {
         Err("the time must be more than 0 seconds".to_owned())
     }
-}
-
-#[derive(Debug, Clone, Args)]
-pub(crate) struct Bench {
-    #[command(subcommand)]
-    pub(crate) action: BenchAction,
-    /// For machines
-    #[arg(long, global = true)]
-    pub(crate) json: bool,
-}
-
-#[derive(Debug, Clone, Subcommand)]
-pub(crate) enum BenchAction {
-    /// The planner: from the text of rules, world and goal to the plan
-    #[command(after_help = "Takes a few seconds.\n\nExample:\n  cortex bench plan --tasks tasks")]
-    Plan {
-        /// Write the tasks into this folder, for other planners
-        #[arg(long, value_name = "DIR")]
-        tasks: Option<PathBuf>,
-    },
 }

@@ -4,6 +4,21 @@ use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::fs;
 
+/// The names of the graph's figures, in the order in which they are told.
+const ORDER: [&str; 11] = [
+    "commit_ack_poll",
+    "visible_poll",
+    "commit_ack_block",
+    "read_attribute",
+    "read_pose",
+    "label_edges_per_edge",
+    "commits_flat_out",
+    "attach_100k",
+    "private_memory_per_agent",
+    "torn_reads",
+    "hot_pose_visible",
+];
+
 /// One measured quantity.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Figure {
@@ -33,6 +48,10 @@ impl Figure {
             "ratio": self.ratio(),
         })
     }
+}
+
+pub(super) fn sort(figures: &mut [Figure]) {
+    figures.sort_by_key(|figure| ORDER.iter().position(|name| *name == figure.name));
 }
 
 /// The figures for people, below what they were measured on.

@@ -1,11 +1,17 @@
 //! `cortex bench`: how fast it is here, beside what it is made of and what it replaces.
 
 use super::output::{print, print_json};
+use crate::bench::{self, Effort};
 use crate::cli::{Bench as Arguments, BenchAction};
-use crate::{Answer, Failure, bench};
+use crate::{Answer, Failure};
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     let figures = match &arguments.action {
+        BenchAction::Graph { quick, thorough } => bench::graph(match (quick, thorough) {
+            (true, _) => Effort::QUICK,
+            (_, true) => Effort::THOROUGH,
+            _ => Effort::NORMAL,
+        })?,
         BenchAction::Plan { tasks } => bench::plans(tasks.as_deref())?,
     };
     if arguments.json {

@@ -34,6 +34,9 @@ pub(crate) fn perform(verb: Verb) -> Result<Answer, Failure> {
         Verb::Mission(arguments) => mission::run(&arguments),
         Verb::Bench(arguments) => bench::run(&arguments),
         Verb::Path(arguments) => path::run(&arguments),
+        Verb::BenchPeer(arguments) => {
+            crate::bench::play(&arguments.role, &arguments.instance, &arguments.numbers)
+        }
     }
 }
 

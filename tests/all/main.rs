@@ -7,6 +7,7 @@
 
 mod algorithms;
 mod architecture;
+mod bench;
 mod dependencies;
 mod documentation;
 mod examples;

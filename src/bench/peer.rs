@@ -1,0 +1,259 @@
+//! The other processes of a measurement. Each says `ready` on its standard output when it has
+//! joined, and ends when its standard input does.
+
+use crate::{Answer, Failure};
+use dsr::{
+    BareServer, Instance, Limits, NodeId, ReadError, Schema, Session, Snapshot, Store, Time,
+    Transaction, Value,
+};
+use nalgebra::{Isometry2, Vector2};
+use std::io::{Read, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use super::PATIENCE;
+use super::replica::Replica;
+
+/// Nodes that `pairs` writes the same number to, each time in one transaction.
+pub(super) const PAIRS: u64 = 8;
+
+/// Plays a role until standard input ends.
+pub(crate) fn play(role: &str, instance: &str, numbers: &[u64]) -> Result<Answer, Failure> {
+    let instance = Instance::new(instance).map_err(Failure::input)?;
+    let number = |index: usize| numbers.get(index).copied().unwrap_or(0);
+    match role {
+        "store" => store(&instance, number(0), Duration::from_micros(number(1)), None),
+        // So little history that memory is reused under slow readers.
+        "forgetful" => store(
+            &instance,
+            number(0),
+            Duration::from_millis(2),
+            Some(64 << 10),
+        ),
+        "bare" => bare(&instance, Duration::from_micros(number(0))),
+        "stamp" => stamp(&instance, number(0)),
+        "reader" => reader(&instance),
+        "join" => join(&instance, false),
+        "copy" => join(&instance, true),
+        "pairs" => pairs(&instance),
+        other => Err(Failure::input(format!("no role `{other}`"))),
+    }?;
+    Ok(Answer::Yes)
+}
+
+fn say(line: &str) -> Result<(), Failure> {
+    let mut output = std::io::stdout().lock();
+    let said = output.write_all(format!("{line}\n").as_bytes());
+    said.and_then(|()| output.flush())
+        .map_err(Failure::internal)
+}
+
+/// True once standard input has ended.
+fn end_of_input() -> Arc<AtomicBool> {
+    let ended = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&ended);
+    std::thread::spawn(move || {
+        // However the input ends, it has.
+        drop(std::io::stdin().read_to_end(&mut Vec::new()));
+        flag.store(true, Ordering::Release);
+    });
+    ended
+}
+
+/// Nanoseconds of a clock that all processes of the host share.
+pub(super) fn clock() -> u64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::Monotonic);
+    time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64
+}
+
+fn attach(instance: &Instance, agent: &str) -> Result<Session, Failure> {
+    Session::attach(instance, agent, PATIENCE).map_err(Failure::internal)
+}
+
+/// `nodes` nodes with four attributes and four edges each.
+fn world(nodes: u64) -> Transaction {
+    let mut transaction = Transaction::new();
+    let pose = Isometry2::new(Vector2::new(1.0, 2.0), 0.5);
+    for n in 0..nodes {
+        let attributes = vec![
+            ("a".to_owned(), Value::F64(n as f64)),
+            ("b".to_owned(), Value::I64(n.cast_signed())),
+            ("c".to_owned(), "text".into()),
+            ("p".to_owned(), pose.into()),
+        ];
+        transaction.create_node("thing", &format!("n{n}"), attributes);
+    }
+    for n in 0..nodes {
+        for (label, step) in [("next", 1), ("next", 131), ("next", 7919), ("near", 17)] {
+            transaction.create_edge(NodeId(1 + n), label, NodeId(1 + (n + step) % nodes));
+        }
+    }
+    transaction
+}
+
+fn store(
+    instance: &Instance,
+    nodes: u64,
+    spin: Duration,
+    history: Option<usize>,
+) -> Result<(), Failure> {
+    let mut store = Store::open(instance, Schema::open()).map_err(Failure::internal)?;
+    if let Some(history_bytes) = history {
+        store.graph_mut().set_limits(Limits { history_bytes });
+    }
+    if nodes > 0 {
+        let committed = store.commit(&world(nodes), Time::default());
+        committed.map_err(Failure::internal)?;
+    }
+    store.set_spin(spin);
+    let ended = end_of_input();
+    say("ready")?;
+    while !ended.load(Ordering::Acquire) {
+        let served = store.serve(Duration::from_millis(20));
+        served.map_err(Failure::internal)?;
+    }
+    Ok(())
+}
+
+fn bare(instance: &Instance, spin: Duration) -> Result<(), Failure> {
+    let server = BareServer::open(instance).map_err(Failure::internal)?;
+    let ended = end_of_input();
+    say("ready")?;
+    while !ended.load(Ordering::Acquire) {
+        let served = server.serve(Duration::from_millis(20), spin);
+        served.map_err(Failure::internal)?;
+    }
+    Ok(())
+}
+
+/// Commits the time and how many times it did, again and again.
+fn stamp(instance: &Instance, times: u64) -> Result<(), Failure> {
+    let mut session = attach(instance, "stamper")?;
+    session.set_spin(PATIENCE);
+    say("ready")?;
+    std::io::stdin()
+        .read_exact(&mut [0; 3])
+        .map_err(Failure::internal)?;
+    for number in 1..=times {
+        // Others have time to see each; the time is taken after the wait.
+        let pause = Instant::now();
+        while pause.elapsed() < Duration::from_micros(50) {
+            std::hint::spin_loop();
+        }
+        let mut transaction = Transaction::new();
+        let value = Value::U64List(vec![number, clock()]);
+        transaction.set(NodeId(1), "stamp", value);
+        let committed = session.commit(&transaction, Time::default());
+        committed.map_err(Failure::internal)?;
+    }
+    Ok(())
+}
+
+/// The number and time of the last stamp.
+pub(super) fn read_stamp(snapshot: &Snapshot) -> Result<Option<(u64, u64)>, ReadError> {
+    let Some(name) = snapshot.schema().find_attribute("stamp") else {
+        return Ok(None);
+    };
+    let node = snapshot.find_node(NodeId(1))?;
+    let value = node.map(|node| node.attribute(name)).transpose()?.flatten();
+    Ok(match value.map(|attribute| attribute.value) {
+        Some(Value::U64List(row)) => row.first_chunk().map(|&[number, time]| (number, time)),
+        _ => None,
+    })
+}
+
+/// An agent that looks a thousand times a second.
+fn reader(instance: &Instance) -> Result<(), Failure> {
+    let mut session = attach(instance, "reader")?;
+    let ended = end_of_input();
+    say("ready")?;
+    let mut node = 0;
+    while !ended.load(Ordering::Acquire) {
+        node = (node + 7919) % super::NODES;
+        let snapshot = session.snapshot().map_err(Failure::internal)?;
+        let found = snapshot.find_node(NodeId(1 + node));
+        let found = found.map_err(Failure::internal)?;
+        let value = found.map(|node| node.value("a")).transpose();
+        value.map_err(Failure::internal)?;
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    Ok(())
+}
+
+/// Joins, reads one attribute, then all of the graph, or copies it; tells the nanoseconds until the
+/// first read (or the copy) was done, and the private memory at the end, in KiB.
+fn join(instance: &Instance, copy: bool) -> Result<(), Failure> {
+    let start = Instant::now();
+    let mut session = attach(instance, "joiner")?;
+    let snapshot = session.snapshot().map_err(Failure::internal)?;
+    let node = snapshot.find_node(NodeId(super::MANY / 2));
+    let node = node.map_err(Failure::internal)?;
+    let value = node.map(|node| node.value("a")).transpose();
+    if value.map_err(Failure::internal)?.flatten().is_none() {
+        return Err(Failure::internal("the graph that was joined is not whole"));
+    }
+    let mut joined = start.elapsed();
+    let replica = copy.then(|| Replica::of(&snapshot)).transpose()?;
+    if copy {
+        joined = start.elapsed();
+    } else {
+        read_all(&snapshot).map_err(Failure::internal)?;
+    }
+    let memory = private_kilobytes()?;
+    drop(replica);
+    say(&format!("{} {memory}", joined.as_nanos()))?;
+    drop(std::io::stdin().read_to_end(&mut Vec::new()));
+    Ok(())
+}
+
+fn read_all(snapshot: &Snapshot) -> Result<(), ReadError> {
+    for node in snapshot.nodes() {
+        let node = node?;
+        std::hint::black_box((node.name()?, node.attributes()?));
+        for edge in node.out_edges() {
+            std::hint::black_box(edge?);
+        }
+    }
+    Ok(())
+}
+
+/// Memory that is this process's own, in KiB.
+fn private_kilobytes() -> Result<u64, Failure> {
+    let text = std::fs::read_to_string("/proc/self/smaps_rollup").map_err(Failure::internal)?;
+    let field = text.lines().find(|line| line.starts_with("Private_Dirty:"));
+    let number = field.and_then(|line| line.split_whitespace().nth(1)?.parse().ok());
+    number.ok_or_else(|| Failure::internal("no Private_Dirty in smaps_rollup"))
+}
+
+/// Writes the same number to several nodes, each time in one transaction, flat out.
+fn pairs(instance: &Instance) -> Result<(), Failure> {
+    let mut session = attach(instance, "writer")?;
+    let mut transaction = Transaction::new();
+    for n in 0..PAIRS {
+        let attributes = vec![("n".to_owned(), Value::U64(0))];
+        transaction.create_node("pair", &format!("pair{n}"), attributes);
+    }
+    let created = session.commit(&transaction, Time::default());
+    let nodes = created.map_err(Failure::internal)?.created;
+    let ended = end_of_input();
+    say("ready")?;
+    let mut number = 0;
+    while !ended.load(Ordering::Acquire) {
+        let batch: Vec<Transaction> = (0..16)
+            .map(|_| {
+                number += 1;
+                let mut transaction = Transaction::new();
+                for &node in &nodes {
+                    transaction.set(node, "n", Value::U64(number));
+                }
+                transaction
+            })
+            .collect();
+        let answers = session.commit_each(&batch, Time::default());
+        for answer in answers.map_err(Failure::internal)? {
+            answer.map_err(Failure::internal)?;
+        }
+    }
+    Ok(())
+}

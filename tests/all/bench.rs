@@ -1,0 +1,57 @@
+//! `cortex bench` as its users meet it: what it tells, and that nothing of it is left. How fast it is
+//! depends on the machine and is not tested.
+
+use crate::support::Program;
+use serde_json::Value;
+use std::fs;
+use tempfile::TempDir;
+
+#[test]
+fn the_graphs_figures_are_all_there_and_no_process_or_memory_of_theirs_is_left() {
+    let folder = TempDir::new().unwrap();
+    let output = Program::command(&["bench", "graph", "--quick", "--json"])
+        .env("CORTEX_RUNTIME_DIR", folder.path())
+        .output()
+        .unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    let figures: Vec<Value> = serde_json::from_slice(&output.stdout).unwrap();
+    let names: Vec<&str> = figures
+        .iter()
+        .map(|f| f["name"].as_str().unwrap())
+        .collect();
+    assert_eq!(
+        names,
+        [
+            "commit_ack_poll",
+            "visible_poll",
+            "commit_ack_block",
+            "read_attribute",
+            "read_pose",
+            "label_edges_per_edge",
+            "commits_flat_out",
+            "attach_100k",
+            "private_memory_per_agent",
+            "torn_reads",
+        ]
+    );
+    for figure in &figures {
+        let (name, value) = (&figure["name"], figure["value"].as_f64().unwrap());
+        assert!(figure["unit"].is_string(), "{name}");
+        if name == "torn_reads" {
+            assert!(value.abs() < f64::EPSILON, "{value} torn reads");
+            assert!(figure["ratio"].is_null());
+        } else {
+            let [raw, ratio] = ["raw", "ratio"].map(|field| figure[field].as_f64().unwrap());
+            assert!(value > 0.0 && raw > 0.0, "{figure}");
+            assert!((ratio - value / raw).abs() < 1e-9 * ratio, "{figure}");
+        }
+    }
+    let user = fs::read_dir(folder.path())
+        .unwrap()
+        .next()
+        .unwrap()
+        .unwrap();
+    let left: Vec<_> = fs::read_dir(user.path()).unwrap().collect();
+    assert!(left.is_empty(), "{left:?}");
+}
