@@ -129,14 +129,23 @@ impl Started {
             .collect()
     }
 
-    /// Kills the process of that name with signal 9.
+    /// Kills the process of that name with signal 9; one that is just being started again is waited
+    /// for.
     pub(crate) fn kill(&self, name: &str) {
-        let found = self.processes().into_iter().find(|(_, line)| {
-            let words: Vec<&str> = line.split(' ').collect();
-            words.get(1) == Some(&name) || words.get(2) == Some(&name)
-        });
-        let (id, _) = found.unwrap_or_else(|| panic!("no process {name}: {:?}", self.processes()));
-        signal(id, Signal::KILL);
+        let find = || {
+            self.processes().into_iter().find(|(_, line)| {
+                let words: Vec<&str> = line.split(' ').collect();
+                words.get(1) == Some(&name) || words.get(2) == Some(&name)
+            })
+        };
+        // Each look takes a millisecond or more.
+        for _ in 0..10_000 {
+            if let Some((id, _)) = find() {
+                return signal(id, Signal::KILL);
+            }
+            std::thread::yield_now();
+        }
+        panic!("no process {name}: {:?}", self.processes());
     }
 
     pub(crate) fn kill_supervisor(&mut self) {
