@@ -25,6 +25,7 @@ mod state;
 mod time;
 mod transaction;
 mod value;
+pub mod wire;
 
 pub use arena::ReadError;
 pub use change::{Change, EdgeChange, Filter, NodeChange, RuleApplication, Touch};

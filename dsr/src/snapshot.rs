@@ -13,7 +13,8 @@ pub use petgraph::{Edges, Neighbors};
 
 use crate::arena::record;
 use crate::arena::tree::{self, Key};
-use crate::arena::{Address, Arena, ReadError, Root, trie};
+use crate::arena::{Address, Arena, ReadError, Root, Word, trie};
+use crate::shm::Segment;
 use crate::value::{hash, place};
 use crate::{
     AttributeId, EdgeKey, LabelId, NodeId, Schema, Time, TypeId, Value, Version, WriterId,
@@ -94,6 +95,31 @@ impl Snapshot {
             schema,
             index: OnceLock::new(),
         }
+    }
+
+    /// The newest version that the words of an arena of one segment hold, whoever wrote them. No
+    /// words make a read of it panic or go on for ever.
+    ///
+    /// # Errors
+    /// [`ReadError::Damaged`] where they hold none.
+    pub fn of_words(words: &[u64]) -> Result<Self, ReadError> {
+        let shift = words.len().next_power_of_two().ilog2();
+        let arena = Arena::new(1, shift);
+        let mut segment: Vec<Word> = Vec::with_capacity(1 << shift);
+        for index in 0..1 << shift {
+            let word = Word::default();
+            word.store(words.get(index).copied().unwrap_or(0));
+            segment.push(word);
+        }
+        arena.attach(0, Segment::on_heap(segment.into()));
+        arena.epoch().ok_or(ReadError::Damaged { address: 0 })?;
+        let root = arena.newest_root()?;
+        let damaged = ReadError::Damaged {
+            address: root.schema,
+        };
+        let bytes = record::read_blob(&arena, root.schema).map_err(|_| damaged)?;
+        let schema: Schema = postcard::from_bytes(&bytes).map_err(|_| damaged)?;
+        Ok(Self::new(Arc::new(arena), root, Arc::new(schema)))
     }
 
     /// The version that this is the state of.
@@ -195,7 +221,7 @@ impl Snapshot {
 
     /// All nodes, in an order that depends on their ids alone.
     pub fn nodes(&self) -> impl Iterator<Item = Result<Node<'_>, ReadError>> {
-        let mut walk = Some(trie::Walk::new(self.root.nodes, self.root.node_count));
+        let mut walk = Some(trie::Walk::new(self.root.nodes));
         std::iter::from_fn(move || {
             let next = self.genuine(walk.as_mut()?.next(&self.arena));
             let next = next.and_then(|address| address.map(|a| self.node_at(a)).transpose());

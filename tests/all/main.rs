@@ -13,6 +13,7 @@ mod documentation;
 mod examples;
 mod faults;
 mod graph;
+mod hostile;
 mod missions;
 mod path;
 mod plan;

@@ -22,7 +22,7 @@ impl SourceFile {
 }
 
 /// What the names of folders begin with that builds and runs write.
-const WRITTEN: [&str; 2] = ["target", "report"];
+const WRITTEN: [&str; 4] = ["target", "report", "corpus", "artifacts"];
 
 /// The repository's root.
 pub(crate) fn root() -> PathBuf {
@@ -51,7 +51,8 @@ fn collect(folder: &Path, prefix: &str, files: &mut Vec<SourceFile>) {
         let kind = entry.file_type().unwrap();
         if kind.is_dir() {
             let hidden = name.starts_with('.') && name != ".ci" && name != ".cargo";
-            let written = prefix.is_empty() && WRITTEN.iter().any(|w| name.starts_with(w));
+            let at_the_top = prefix.is_empty() || prefix == "fuzz/";
+            let written = at_the_top && WRITTEN.iter().any(|w| name.starts_with(w));
             if !hidden && !written {
                 collect(&entry.path(), &format!("{path}/"), files);
             }
@@ -64,11 +65,14 @@ fn collect(folder: &Path, prefix: &str, files: &mut Vec<SourceFile>) {
     }
 }
 
-/// The manifest of each package, and its path.
+/// The fuzz targets are a workspace of their own, which the normal build leaves alone.
+const FUZZ: &str = "fuzz/Cargo.toml";
+
+/// The manifest of each package of the workspace, and its path.
 pub(crate) fn manifests() -> Vec<(String, toml::Table)> {
     let manifests = files()
         .into_iter()
-        .filter(|file| file.path.ends_with("Cargo.toml"));
+        .filter(|file| file.path.ends_with("Cargo.toml") && file.path != FUZZ);
     manifests
         .map(|file| (file.path, file.text.parse().unwrap()))
         .collect()

@@ -228,37 +228,92 @@ pub(crate) fn remove(writer: &mut Writer, link: Link, id: u64) -> Result<Link, F
 }
 
 /// Walks the records by ascending id.
+///
+/// In a damaged arena blocks may lead to themselves or to each other. The walk ends all the same, for
+/// levels fall from block to block, no block is empty, and ids ascend.
 #[derive(Debug, Clone)]
 pub(crate) struct Walk {
-    /// Links still to follow, last first.
-    stack: Vec<Link>,
-    /// Bounds the walk in a damaged arena.
-    budget: u64,
+    /// Links still to follow, last first, each with the level that its block must lie below.
+    stack: Vec<(Link, u64)>,
+    last: Option<u64>,
 }
 
 impl Walk {
-    pub(crate) fn new(root: Link, count: u64) -> Self {
+    pub(crate) fn new(root: Link) -> Self {
         Self {
-            stack: if root == 0 { Vec::new() } else { vec![root] },
-            budget: count.saturating_mul(LEVELS + 1).saturating_add(1),
+            stack: (root != 0).then_some((root, LEVELS)).into_iter().collect(),
+            last: None,
         }
     }
 
     /// The next record; `Err` where the trie leads to an impossible place.
     pub(crate) fn next(&mut self, arena: &Arena) -> Result<Option<Address>, Address> {
-        while let Some(link) = self.stack.pop() {
+        while let Some((link, above)) = self.stack.pop() {
             let address = address_of(link);
+            let words = arena.from(address).ok_or(address)?;
+            let first = words.first().ok_or(address)?.load();
             if is_record(link) {
+                if self.last.is_some_and(|last| first <= last) {
+                    return Err(address);
+                }
+                self.last = Some(first);
                 return Ok(Some(address));
             }
-            self.budget = self.budget.checked_sub(1).ok_or(address)?;
-            let words = arena.from(address).ok_or(address)?;
-            let bitmap = words.first().ok_or(address)?.load();
+            let level = level_of(link);
+            if level >= above || first == 0 {
+                return Err(address);
+            }
             let links = words
-                .get(HEADER..HEADER + bitmap.count_ones() as usize)
+                .get(HEADER..HEADER + first.count_ones() as usize)
                 .ok_or(address)?;
-            self.stack.extend(links.iter().rev().map(Word::load));
+            let links = links.iter().rev().map(|link| (link.load(), level));
+            self.stack.extend(links);
         }
         Ok(None)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arena::allocator::{Growth, HeapGrowth};
+
+    const BLOCK: Address = 70_000;
+    const RECORD: Address = 80_000;
+
+    /// An arena with a block of as many links as one can have, all to `link`, and a record.
+    fn arena(link: Link) -> Arena {
+        let arena = Arena::new(1, 17);
+        HeapGrowth.grow(&arena, 0).unwrap();
+        let block = arena.block(BLOCK, HEADER + 64).unwrap();
+        block[0].store(u64::MAX);
+        for word in &block[HEADER..] {
+            word.store(link);
+        }
+        arena.block(RECORD, 1).unwrap()[0].store(5);
+        arena
+    }
+
+    /// A walk once put all links of such a block on its stack, over and over, for as long as the
+    /// root said that there were nodes left.
+    #[test]
+    fn a_block_that_leads_to_itself_ends_a_walk() {
+        let link = to_block(BLOCK, 3);
+        assert_eq!(Walk::new(link).next(&arena(link)), Err(BLOCK));
+    }
+
+    #[test]
+    fn a_record_counts_once() {
+        let arena = arena(to_record(RECORD));
+        let mut walk = Walk::new(to_block(BLOCK, 0));
+        assert_eq!(walk.next(&arena), Ok(Some(RECORD)));
+        assert_eq!(walk.next(&arena), Err(RECORD));
+    }
+
+    #[test]
+    fn an_empty_block_is_damage() {
+        let arena = arena(0);
+        arena.block(BLOCK, 1).unwrap()[0].store(0);
+        assert_eq!(Walk::new(to_block(BLOCK, 0)).next(&arena), Err(BLOCK));
     }
 }

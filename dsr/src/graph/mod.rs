@@ -210,6 +210,14 @@ impl Graph {
         )
     }
 
+    /// The words of its memory's first segment, as other processes would see them; see
+    /// [`Snapshot::of_words`].
+    pub fn words(&self) -> Vec<u64> {
+        self.announce();
+        let words = self.writer.arena.from(0).unwrap_or(&[]);
+        words.iter().map(crate::arena::Word::load).collect()
+    }
+
     /// This life of the store.
     pub fn epoch(&self) -> Epoch {
         self.epoch

@@ -1,0 +1,179 @@
+//! What each fuzz target does with its bytes: decodes them, and uses what came of it as the
+//! program would. It guarantees nothing; that is what it is for: whatever the bytes, no function
+//! here may panic or go on for ever. The tests of the workspace run the same functions.
+
+use dsr::{Graph, ReadError, Schema, Snapshot, Time, Transaction, Version};
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// Commits it to an empty graph, and reads what came of it in every way.
+fn commit(transaction: &Transaction) {
+    let mut graph = Graph::in_memory(Schema::open());
+    if graph.commit(transaction, "fuzz", Time::default()).is_ok() {
+        let snapshot = graph.snapshot();
+        assert!(read(&snapshot).is_ok(), "the graph's own memory is damaged");
+        assert!(dsr::json::to_json(&snapshot).is_ok());
+    }
+}
+
+/// Graph JSON (`dsr/1`).
+pub fn graph_json(bytes: &[u8]) {
+    if let Ok(transaction) = dsr::json::from_json(&text(bytes)) {
+        commit(&transaction);
+    }
+}
+
+/// RoboComp DSR JSON, AGM model XML, or graph JSON: whichever it looks like.
+pub fn world(bytes: &[u8]) {
+    if let Ok(import) = dsr::interchange::read(&text(bytes)) {
+        commit(&import.transaction);
+    }
+}
+
+/// A transaction as it goes to the store.
+pub fn transaction(bytes: &[u8]) {
+    if let Ok(transaction) = dsr::wire::decode_transaction(bytes) {
+        commit(&transaction);
+    }
+}
+
+/// A change as it goes to every agent.
+pub fn change(bytes: &[u8]) {
+    if let Ok(change) = dsr::wire::decode_change(bytes) {
+        let everything = dsr::Filter::default();
+        assert!(everything.passes(&change, &Schema::open()));
+    }
+}
+
+/// A graph as it goes from a supervisor to a store.
+pub fn image(bytes: &[u8]) {
+    if let Ok(image) = dsr::decode_image(bytes) {
+        let mut graph = Graph::in_memory(Schema::open());
+        if graph.restore(&image).is_ok() {
+            assert!(read(&graph.snapshot()).is_ok());
+        }
+    }
+}
+
+/// A schema file.
+pub fn schema(bytes: &[u8]) {
+    drop(Schema::from_toml("schema.toml", &text(bytes)));
+}
+
+/// A grammar: parsed, checked, printed.
+pub fn grammar(bytes: &[u8]) {
+    let (_, diagnostics) = grammar::parse_grammar(&text(bytes), "rules.aggl");
+    for diagnostic in diagnostics {
+        assert!(diagnostic.line_and_column().0 > 0, "lines count from 1");
+    }
+}
+
+/// A goal.
+pub fn goal(bytes: &[u8]) {
+    drop(grammar::parse_goal(
+        &text(bytes),
+        "goal.aggt",
+        &grammar::Types::default(),
+    ));
+}
+
+/// A scenario's main file.
+pub fn scenario(bytes: &[u8]) {
+    let nothing = |_: &str| Ok(String::new());
+    drop(scenarios::Scenario::parse(
+        "scenario.toml",
+        &text(bytes),
+        &nothing,
+    ));
+}
+
+/// The memory of a graph, overwritten: each eleven bytes say where (three) and with what (eight).
+pub fn arena(bytes: &[u8]) {
+    let mut words = small_graph().words();
+    let used = words
+        .iter()
+        .rposition(|word| *word != 0)
+        .map_or(1, |last| last + 1);
+    for change in bytes.chunks_exact(11).take(64) {
+        let mut eight = [0; 8];
+        eight.copy_from_slice(&change[3..]);
+        let place =
+            usize::from(change[0]) | usize::from(change[1]) << 8 | usize::from(change[2]) << 16;
+        words[place % used] = u64::from_le_bytes(eight);
+    }
+    if let Ok(snapshot) = Snapshot::of_words(&words) {
+        match read(&snapshot) {
+            // No more is there than there is room for.
+            Ok(count) => assert!(count <= 64 * words.len() as u64, "{count} things read"),
+            Err(ReadError::Damaged { .. } | ReadError::SnapshotTooOld { .. }) => {}
+        }
+    }
+}
+
+/// A graph with something of everything in it.
+pub fn small_graph() -> Graph {
+    let mut graph = Graph::in_memory(Schema::open());
+    for i in 0..70u64 {
+        let mut transaction = Transaction::new();
+        let attributes = vec![
+            ("n".to_owned(), i.into()),
+            ("text".to_owned(), format!("{i}").repeat(9).into()),
+            ("row".to_owned(), [0.5; 6].into()),
+        ];
+        transaction.create_node("thing", &format!("node{i}"), attributes);
+        if i > 0 {
+            let (parent, child) = (format!("node{}", i / 2), format!("node{i}"));
+            let pose = dsr::Pose::translation(1.0, 0.0, 0.0);
+            transaction.push(dsr::Operation::CreateEdge {
+                edge: dsr::EdgeRef::new(parent, "pose", child),
+                attributes: vec![("transform".to_owned(), dsr::Value::Pose(pose))],
+            });
+            transaction.create_edge(format!("node{i}"), "next", format!("node{}", i * 7 % i));
+        }
+        drop(graph.commit(&transaction, &format!("agent{}", i % 3), Time::default()));
+    }
+    graph
+}
+
+/// Reads a snapshot in every way; how many things there were.
+///
+/// # Errors
+/// The first error that a read gave.
+pub fn read(snapshot: &Snapshot) -> Result<u64, ReadError> {
+    let mut count = 0;
+    let schema = snapshot.schema();
+    for node in snapshot.nodes() {
+        let node = node?;
+        count += 1 + node.attributes()?.len() as u64;
+        if node.version()? > Version(u64::MAX - 1) {
+            count += 1;
+        }
+        snapshot.find_node_by_name(&node.name()?)?;
+        for key in node.out_edges().chain(node.in_edges()) {
+            if let Some(edge) = snapshot.find_edge(key?)? {
+                count += 1 + edge.attributes()?.len() as u64;
+            }
+        }
+        snapshot.pose_in_world(node.id())?;
+    }
+    for type_id in (0..schema.types().len()).map(|id| dsr::TypeId(id as u16)) {
+        for node in snapshot.nodes_of_type(type_id) {
+            node?;
+            count += 1;
+        }
+        snapshot.count_of_type(type_id)?;
+    }
+    for label in (0..schema.labels().len()).map(|id| dsr::LabelId(id as u16)) {
+        for key in snapshot.edges_of_label(label) {
+            key?;
+            count += 1;
+        }
+        for triple in snapshot.triple_counts(label) {
+            triple?;
+        }
+        snapshot.count_of_label(label)?;
+    }
+    Ok(count)
+}

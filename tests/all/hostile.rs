@@ -1,0 +1,210 @@
+//! Every decoder against bytes that nobody would write: random ones, and good ones that were spoilt.
+//! The functions are those of the fuzz targets.
+
+#[allow(unreachable_pub, reason = "they are public to the fuzz targets")]
+#[path = "../../fuzz/src/entries.rs"]
+mod entries;
+
+use crate::support::root;
+use dsr::wire::{encode_change, encode_transaction};
+use dsr::{Graph, Image, Schema, Time, Transaction};
+use proptest::prelude::*;
+use proptest::test_runner::{Config, TestRunner};
+
+/// How a good text is spoilt, one after the other.
+#[derive(Debug, Clone)]
+enum Harm {
+    Overwrite(usize, u8),
+    Remove(usize, usize),
+    Repeat(usize, usize),
+    Insert(usize, Vec<u8>),
+}
+
+fn harm() -> impl Strategy<Value = Harm> {
+    let places = any::<prop::sample::Index>().prop_map(|i| i.index(1 << 20));
+    let word = prop::sample::select(vec![
+        "{",
+        "}",
+        "[",
+        "]",
+        "\"",
+        "=",
+        "(",
+        ")",
+        "<",
+        ">",
+        "->",
+        "*",
+        ":",
+        ",",
+        "0",
+        "-1",
+        "1e999",
+        "null",
+        "id",
+        "\u{0}",
+        "\u{feff}",
+        "é",
+        "18446744073709551615",
+        "-9223372036854775808",
+    ]);
+    prop_oneof![
+        (places.clone(), any::<u8>()).prop_map(|(at, byte)| Harm::Overwrite(at, byte)),
+        (places.clone(), 1..40usize).prop_map(|(at, length)| Harm::Remove(at, length)),
+        (places.clone(), 1..40usize).prop_map(|(at, length)| Harm::Repeat(at, length)),
+        (places, word).prop_map(|(at, word)| Harm::Insert(at, word.into())),
+    ]
+}
+
+fn spoil(good: &[u8], harms: &[Harm]) -> Vec<u8> {
+    let mut bytes = good.to_vec();
+    for harm in harms {
+        let (Harm::Overwrite(at, _)
+        | Harm::Remove(at, _)
+        | Harm::Repeat(at, _)
+        | Harm::Insert(at, _)) = harm;
+        let at = at % bytes.len().max(1);
+        let until = |length: &usize| (at + length).min(bytes.len());
+        match harm {
+            Harm::Overwrite(_, byte) => {
+                if let Some(place) = bytes.get_mut(at) {
+                    *place = *byte;
+                }
+            }
+            Harm::Remove(_, length) => drop(bytes.drain(at..until(length))),
+            Harm::Repeat(_, length) => {
+                let again = bytes[at..until(length)].to_vec();
+                bytes.splice(at..at, again);
+            }
+            Harm::Insert(_, word) => {
+                bytes.splice(at..at.min(bytes.len()), word.iter().copied());
+            }
+        }
+    }
+    bytes
+}
+
+/// `CORTEX_ROUNDS` asks for more than the default.
+fn rounds(default: u32) -> Config {
+    let asked = std::env::var("CORTEX_ROUNDS").map(|text| text.parse().unwrap());
+    Config {
+        cases: asked.unwrap_or(default),
+        failure_persistence: None,
+        ..Config::default()
+    }
+}
+
+fn withstands(entry: fn(&[u8]), good: &[u8]) {
+    entry(good);
+    let bytes = prop_oneof![
+        1 => prop::collection::vec(any::<u8>(), 0..200),
+        4 => prop::collection::vec(harm(), 1..6).prop_map({
+            let good = good.to_vec();
+            move |harms| spoil(&good, &harms)
+        }),
+    ];
+    TestRunner::new(rounds(200))
+        .run(&bytes, |bytes| {
+            entry(&bytes);
+            Ok(())
+        })
+        .unwrap();
+}
+
+fn shipped(path: &str) -> Vec<u8> {
+    std::fs::read(root().join(path)).unwrap()
+}
+
+const GRAPH: &str = r#"{"format":"dsr/1","nodes":[
+    {"id":1,"type":"Room","name":"kitchen","attributes":{"area":12.5}},
+    {"id":2,"type":"Robot","name":"shelly","attributes":{"n":{"type":"u64","value":"7"}}}],
+    "edges":[{"from":2,"label":"in","to":1,"attributes":{"since":3}}]}"#;
+
+const ROBOCOMP: &str = r#"{"DSRModel":{"name":"x","symbols":{"1":{"id":"1","name":"world",
+    "type":"world","attribute":{"level":{"type":1,"value":0},"pose":{"type":3,"value":[1.0,2.0]}},
+    "links":[{"src":"1","dst":"2","label":"RT","linkAttribute":{"t":{"type":2,"value":1.5}}}]},
+    "2":{"id":"2","name":"robot","type":"robot","attribute":{},"links":[]}}}}"#;
+
+const AGM: &str = r#"<AGMModel><symbol id="1" type="robot"/><symbol id="2" type="room">
+    <attribute key="imName" value="kitchen"/></symbol><link src="1" dst="2" label="in"/></AGMModel>"#;
+
+fn transaction() -> Transaction {
+    dsr::json::from_json(GRAPH).unwrap()
+}
+
+#[test]
+fn graph_json() {
+    withstands(entries::graph_json, GRAPH.as_bytes());
+}
+
+#[test]
+fn worlds_of_other_systems() {
+    withstands(entries::world, ROBOCOMP.as_bytes());
+    withstands(entries::world, AGM.as_bytes());
+}
+
+#[test]
+fn transactions_and_changes() {
+    withstands(entries::transaction, &encode_transaction(&transaction()));
+    let mut graph = Graph::in_memory(Schema::open());
+    let (_, change) = graph
+        .commit(&transaction(), "agent", Time::default())
+        .unwrap();
+    withstands(entries::change, &encode_change(&change));
+}
+
+#[test]
+fn images() {
+    let image = Image::of(&entries::small_graph().snapshot()).unwrap();
+    withstands(entries::image, &image.to_bytes());
+}
+
+#[test]
+fn schema_files() {
+    withstands(entries::schema, &shipped("scenarios/src/schema.toml"));
+}
+
+#[test]
+fn grammars_and_goals() {
+    withstands(
+        entries::grammar,
+        &shipped("scenarios/care-centre/rules.aggl"),
+    );
+    let goal =
+        b"{ \"robot\":robot r:room \"robot\"->r(in) }\nprecondition { (not \"robot\"->r(at)) }";
+    withstands(entries::goal, goal);
+}
+
+#[test]
+fn scenario_files() {
+    withstands(
+        entries::scenario,
+        &shipped("scenarios/care-centre/scenario.toml"),
+    );
+}
+
+#[test]
+fn a_graphs_memory() {
+    let whole = dsr::Snapshot::of_words(&entries::small_graph().words()).unwrap();
+    let count = entries::read(&whole).unwrap();
+    assert!(count > 600, "{count} things in it");
+    // What is likely to lead somewhere: small numbers, addresses, links, counts.
+    let word = prop_oneof![
+        3 => 0..200_000u64,
+        2 => (0..400_000u64).prop_map(|address| address << 1 | 1),
+        1 => (0..64u64, 0..64u64).prop_map(|(low, high)| low | high << 32),
+        1 => any::<u64>(),
+    ];
+    let change = (0..1u32 << 24, word).prop_map(|(place, word)| {
+        let mut bytes = place.to_le_bytes()[..3].to_vec();
+        bytes.extend(word.to_le_bytes());
+        bytes
+    });
+    let changes = prop::collection::vec(change, 1..12);
+    TestRunner::new(rounds(400))
+        .run(&changes, |changes| {
+            entries::arena(&changes.concat());
+            Ok(())
+        })
+        .unwrap();
+}
