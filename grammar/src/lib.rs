@@ -76,6 +76,7 @@ mod matching;
 mod number;
 mod parser;
 mod print;
+mod rewriter;
 mod rule;
 mod source;
 #[cfg(test)]
@@ -96,6 +97,7 @@ pub use matching::{
 };
 pub use number::Number;
 pub use parser::DEPTH_LIMIT;
+pub use rewriter::{RewriteError, Rewriter, WorkingGraph};
 pub use rule::{
     Arithmetic, AttributePath, Comparison, Condition, Effect, Expression, Kind, Literal, Pattern,
     PatternEdge, PatternNode, Rule,

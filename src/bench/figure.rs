@@ -86,7 +86,7 @@ pub(crate) fn table(figures: &[Figure]) -> String {
 }
 
 /// The machine, its load, and the program's version and commit.
-fn host() -> String {
+pub(super) fn host() -> String {
     let read = |path: &str| fs::read_to_string(path).unwrap_or_default();
     let cpuinfo = read("/proc/cpuinfo");
     let model = cpuinfo

@@ -1,6 +1,6 @@
 //! Measuring what Cortex is made of: the shared graph beside raw iceoryx2 and a copy on the heap, the
-//! planner from text to plan. It guarantees that a figure and the one it is compared with come from
-//! the same run, taken in turns where both are short.
+//! planner from text to plan, rules beside other matchers. It guarantees that a figure and the one it
+//! is compared with come from the same run, taken in turns where both are short.
 //!
 //! Who measures the graph starts a store and peers by executing the program again, in an instance of
 //! its own, and ends and removes all of them.
@@ -18,11 +18,13 @@ mod peer;
 mod plan;
 mod reads;
 mod replica;
+mod rules;
 mod whole;
 
 pub(crate) use figure::{Figure, table};
 pub(crate) use peer::play;
 pub(crate) use plan::plans;
+pub(crate) use rules::{Quantity, rules, table as rules_table};
 
 use crate::Failure;
 use hall::Hall;

@@ -25,6 +25,12 @@ pub(crate) enum BenchAction {
         #[arg(long, conflicts_with = "quick")]
         thorough: bool,
     },
+    /// Rules: matches, changes of matches, rewriting, parsing
+    #[command(
+        after_help = "Takes a minute or two, most of it for other engines.\n\n\
+        Example:\n  cortex bench rules"
+    )]
+    Rules,
     /// The planner: from the text of rules, world and goal to the plan
     #[command(after_help = "Takes a few seconds.\n\nExample:\n  cortex bench plan --tasks tasks")]
     Plan {

@@ -12,6 +12,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
             (_, true) => Effort::THOROUGH,
             _ => Effort::NORMAL,
         })?,
+        BenchAction::Rules => return rules(arguments.json),
         BenchAction::Plan { tasks } => bench::plans(tasks.as_deref())?,
     };
     if arguments.json {
@@ -19,6 +20,17 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
         print_json(&figures.into())?;
     } else {
         print(&bench::table(&figures))?;
+    }
+    Ok(Answer::Yes)
+}
+
+fn rules(as_json: bool) -> Result<Answer, Failure> {
+    let quantities = bench::rules()?;
+    if as_json {
+        let rows: Vec<_> = quantities.iter().map(bench::Quantity::to_json).collect();
+        print_json(&rows.into())?;
+    } else {
+        print(&bench::rules_table(&quantities))?;
     }
     Ok(Answer::Yes)
 }

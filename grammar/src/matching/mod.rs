@@ -27,9 +27,13 @@ pub use watch::{MatchDelta, RuleMatch, Watch};
 pub(crate) use choice::Choices;
 pub(crate) use domain::Domain as MatchDomain;
 pub(crate) use evaluate::Environment;
+pub(crate) use host::Host;
 pub(crate) use obstacle::words;
+pub(crate) use plan::Plan;
+pub(crate) use planned::Planned;
 pub(crate) use program::{Compiler, Link, Slot, Term, Test};
 pub(crate) use query::Problem;
+pub(crate) use search::Frame;
 
 use crate::{Binding, Condition, Expression, Grammar, Number, PatternEdge, PatternNode, Rule};
 use dsr::{ReadError, Snapshot, Value};

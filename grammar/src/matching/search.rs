@@ -4,11 +4,11 @@
 //! determine; matches are injective.
 
 use super::candidates::Candidates;
-use super::evaluate::{is_there, node};
+use super::evaluate::{Environment, is_there, node};
 use super::host::Host;
 use super::plan::{Plan, Source, plan};
 use super::program::Slot;
-use super::query::Problem;
+use super::query::{Problem, Query};
 use super::statistics::Statistics;
 use crate::Binding;
 use dsr::{NodeId, ReadError, Snapshot};
@@ -47,15 +47,129 @@ impl<'h, H: Host> Search<'h, H> {
         }
     }
 
+    fn frame(&self) -> Frame<'h, '_, H> {
+        Frame {
+            host: self.host,
+            query: &self.problem.query,
+            plan: &self.plan,
+        }
+    }
+
+    /// Goes to the next match; `false` where there is none. After that, and after an error, there
+    /// is none any more.
+    pub(crate) fn advance(&mut self) -> Result<bool, ReadError> {
+        let found = self.try_advance();
+        if !matches!(found, Ok(true)) {
+            self.state = State::Done;
+        }
+        found
+    }
+
+    fn try_advance(&mut self) -> Result<bool, ReadError> {
+        match self.state {
+            State::Done => return Ok(false),
+            State::Running => {}
+            State::Fresh => {
+                self.state = State::Running;
+                let Self {
+                    host,
+                    problem: Problem { query, environment },
+                    plan,
+                    ..
+                } = self;
+                let frame = Frame {
+                    host: *host,
+                    query,
+                    plan,
+                };
+                if !frame.given_holds(environment)? {
+                    return Ok(false);
+                }
+                if self.plan.steps.is_empty() {
+                    return Ok(true);
+                }
+                let first = self.frame().candidates(0, &self.problem.environment)?;
+                self.levels.push(first);
+            }
+        }
+        while let Some(depth) = self.levels.len().checked_sub(1) {
+            let Some(candidate) = self.levels[depth].next() else {
+                self.levels.pop();
+                continue;
+            };
+            self.seen[depth][0] += 1;
+            let Self {
+                host,
+                problem: Problem { query, environment },
+                plan,
+                ..
+            } = self;
+            let frame = Frame {
+                host: *host,
+                query,
+                plan,
+            };
+            if !frame.accept(depth, candidate?, environment)? {
+                continue;
+            }
+            self.seen[depth][1] += 1;
+            if depth + 1 == self.plan.steps.len() {
+                return Ok(true);
+            }
+            let environment = &self.problem.environment;
+            let next = self.frame().candidates(depth + 1, environment)?;
+            self.levels.push(next);
+        }
+        Ok(false)
+    }
+
+    /// By step, how many candidates there were so far, and how many of them passed.
+    pub(crate) fn seen(&self) -> &[[u64; 2]] {
+        &self.seen
+    }
+
+    /// The nodes of the match that [`Self::advance`] went to, by slot.
+    pub(crate) fn nodes(&self) -> impl Iterator<Item = NodeId> {
+        let variables = self.problem.query.variables.len();
+        (0..variables).filter_map(|slot| node(&self.problem.environment, slot))
+    }
+
+    fn binding(&self) -> Binding {
+        let variables = self.problem.query.variables.iter();
+        Binding::of_distinct(variables.cloned().zip(self.nodes()))
+    }
+}
+
+/// What a search goes by.
+pub(crate) struct Frame<'h, 'p, H: Host> {
+    pub(crate) host: &'h H,
+    pub(crate) query: &'p Query,
+    pub(crate) plan: &'p Plan,
+}
+
+impl<'h, H: Host> Frame<'h, '_, H> {
+    /// Puts the first match into the slots, those that are given kept.
+    pub(crate) fn first(&self, environment: &mut Environment) -> Result<bool, ReadError> {
+        Ok(self.given_holds(environment)? && self.descend(0, environment)?)
+    }
+
+    fn descend(&self, depth: usize, environment: &mut Environment) -> Result<bool, ReadError> {
+        if depth == self.plan.steps.len() {
+            return Ok(true);
+        }
+        for candidate in self.candidates(depth, environment)? {
+            if self.accept(depth, candidate?, environment)?
+                && self.descend(depth + 1, environment)?
+            {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
     /// What can be said of the slots that are bound from the start.
-    fn given_holds(&mut self) -> Result<bool, ReadError> {
-        let Self {
-            host,
-            problem,
-            plan,
-            ..
-        } = self;
-        let Problem { query, environment } = problem;
+    fn given_holds(&self, environment: &mut Environment) -> Result<bool, ReadError> {
+        let Self { host, query, plan } = self;
         for (index, &slot) in plan.given.iter().enumerate() {
             let others = &plan.given[..index];
             if others
@@ -86,9 +200,12 @@ impl<'h, H: Host> Search<'h, H> {
         Ok(true)
     }
 
-    fn candidates(&self, depth: usize) -> Result<Candidates<'h, H>, ReadError> {
-        let host = self.host;
-        let Problem { query, environment } = &self.problem;
+    fn candidates(
+        &self,
+        depth: usize,
+        environment: &[Slot],
+    ) -> Result<Candidates<'h, H>, ReadError> {
+        let Self { host, query, .. } = *self;
         let ids = match self.plan.steps[depth].source {
             Source::Nodes { slot } => {
                 return Ok(Candidates::members(host, query.domains[slot].types()));
@@ -123,17 +240,12 @@ impl<'h, H: Host> Search<'h, H> {
 
     /// Puts a candidate into its slots and tests what can be tested now.
     fn accept(
-        &mut self,
+        &self,
         depth: usize,
         (first, second): (NodeId, Option<NodeId>),
+        environment: &mut Environment,
     ) -> Result<bool, ReadError> {
-        let Self {
-            host,
-            problem,
-            plan,
-            ..
-        } = self;
-        let Problem { query, environment } = problem;
+        let Self { host, query, plan } = self;
         let step = &plan.steps[depth];
         if second == Some(first) {
             return Ok(false);
@@ -174,67 +286,6 @@ impl<'h, H: Host> Search<'h, H> {
             }
         }
         Ok(true)
-    }
-
-    /// Goes to the next match; `false` where there is none. After that, and after an error, there
-    /// is none any more.
-    pub(crate) fn advance(&mut self) -> Result<bool, ReadError> {
-        let found = self.try_advance();
-        if !matches!(found, Ok(true)) {
-            self.state = State::Done;
-        }
-        found
-    }
-
-    fn try_advance(&mut self) -> Result<bool, ReadError> {
-        match self.state {
-            State::Done => return Ok(false),
-            State::Running => {}
-            State::Fresh => {
-                self.state = State::Running;
-                if !self.given_holds()? {
-                    return Ok(false);
-                }
-                if self.plan.steps.is_empty() {
-                    return Ok(true);
-                }
-                let first = self.candidates(0)?;
-                self.levels.push(first);
-            }
-        }
-        while let Some(depth) = self.levels.len().checked_sub(1) {
-            let Some(candidate) = self.levels[depth].next() else {
-                self.levels.pop();
-                continue;
-            };
-            self.seen[depth][0] += 1;
-            if !self.accept(depth, candidate?)? {
-                continue;
-            }
-            self.seen[depth][1] += 1;
-            if depth + 1 == self.plan.steps.len() {
-                return Ok(true);
-            }
-            let next = self.candidates(depth + 1)?;
-            self.levels.push(next);
-        }
-        Ok(false)
-    }
-
-    /// By step, how many candidates there were so far, and how many of them passed.
-    pub(crate) fn seen(&self) -> &[[u64; 2]] {
-        &self.seen
-    }
-
-    /// The nodes of the match that [`Self::advance`] went to, by slot.
-    pub(crate) fn nodes(&self) -> impl Iterator<Item = NodeId> {
-        let variables = self.problem.query.variables.len();
-        (0..variables).filter_map(|slot| node(&self.problem.environment, slot))
-    }
-
-    fn binding(&self) -> Binding {
-        let variables = self.problem.query.variables.iter();
-        Binding::of_distinct(variables.cloned().zip(self.nodes()))
     }
 }
 

@@ -10,7 +10,7 @@ use super::MatchError;
 use super::planned::Planned;
 use super::program::Slot;
 use super::query::Problem;
-use super::search::Search;
+use super::search::{Frame, Search};
 use crate::{Binding, Grammar, Name, Rule};
 use dsr::{
     Change, EdgeChange, Epoch, LabelId, NodeChange, NodeId, ReadError, Schema, Snapshot, Touch,
@@ -446,10 +446,15 @@ impl Pattern {
 
     /// Whether a match still holds.
     fn holds(&mut self, snapshot: &Snapshot, row: &Row) -> Result<bool, ReadError> {
-        let problem = self.at(row.iter().copied().enumerate());
+        let mut problem = self.at(row.iter().copied().enumerate());
         let given: Vec<usize> = (0..row.len()).collect();
         let plan = self.planned.plan(snapshot, &given)?;
-        Search::new(snapshot, problem, plan).advance()
+        let frame = Frame {
+            host: snapshot,
+            query: &problem.query,
+            plan: &plan,
+        };
+        frame.first(&mut problem.environment)
     }
 }
 

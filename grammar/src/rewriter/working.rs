@@ -1,0 +1,287 @@
+//! A graph that is worked on in memory.
+//!
+//! Guarantee: both ends of every edge have it, in ascending order.
+
+use crate::matching::Host;
+use dsr::{
+    AttributeId, EdgeKey, LabelId, NodeId, NodeIds, ReadError, Snapshot, TripleCount, TypeId,
+    Value, ValueRange, Version,
+};
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::BTreeSet;
+
+/// Ids below this many times the number of nodes, and a few, are looked up by place.
+const DENSE: u64 = 4;
+
+/// Nodes and links of a snapshot, to be rewritten in place: without versions, names or a schema's
+/// ranges. Attributes are those of the snapshot, for as long as it can be read.
+#[derive(Debug, Clone)]
+pub struct WorkingGraph {
+    base: Snapshot,
+    near: Vec<Option<Entry>>,
+    far: FxHashMap<NodeId, Entry>,
+    /// By exact type.
+    members: Vec<BTreeSet<NodeId>>,
+    /// Edges that went: if they are there again, then without attributes.
+    renewed: FxHashSet<EdgeKey>,
+    next: u64,
+}
+
+#[derive(Debug, Clone)]
+struct Entry {
+    exact: TypeId,
+    out: Vec<(LabelId, NodeId)>,
+    into: Vec<(LabelId, NodeId)>,
+}
+
+/// The ends under one label.
+fn labelled(ends: &[(LabelId, NodeId)], label: LabelId) -> &[(LabelId, NodeId)] {
+    let from = ends.partition_point(|&(other, _)| other < label);
+    let count = ends[from..].partition_point(|&(other, _)| other == label);
+    &ends[from..from + count]
+}
+
+fn add(ends: &mut Vec<(LabelId, NodeId)>, end: (LabelId, NodeId)) -> bool {
+    match ends.binary_search(&end) {
+        Ok(_) => false,
+        Err(at) => {
+            ends.insert(at, end);
+            true
+        }
+    }
+}
+
+fn take(ends: &mut Vec<(LabelId, NodeId)>, end: (LabelId, NodeId)) -> bool {
+    let at = ends.binary_search(&end);
+    at.map(|at| ends.remove(at)).is_ok()
+}
+
+impl WorkingGraph {
+    /// A copy of a snapshot's nodes and links.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn of(snapshot: &Snapshot) -> Result<Self, ReadError> {
+        let mut graph = Self {
+            base: snapshot.clone(),
+            near: Vec::new(),
+            far: FxHashMap::default(),
+            members: vec![BTreeSet::new(); snapshot.schema().types().len()],
+            renewed: FxHashSet::default(),
+            next: 1,
+        };
+        let dense = snapshot.node_count().saturating_mul(DENSE) + 64;
+        graph.near.resize(dense as usize, None);
+        for node in snapshot.nodes() {
+            let node = node?;
+            let ends = |ids: &mut dyn Iterator<Item = Result<(LabelId, NodeId), ReadError>>| {
+                ids.collect::<Result<Vec<_>, _>>()
+            };
+            let out = ends(
+                &mut node
+                    .out_edges()
+                    .map(|key| key.map(|key| (key.label, key.to))),
+            )?;
+            let into = ends(
+                &mut node
+                    .in_edges()
+                    .map(|key| key.map(|key| (key.label, key.from))),
+            )?;
+            graph.put(
+                node.id(),
+                Entry {
+                    exact: node.type_id(),
+                    out,
+                    into,
+                },
+            );
+        }
+        Ok(graph)
+    }
+
+    fn put(&mut self, node: NodeId, entry: Entry) {
+        let exact = usize::from(entry.exact.0);
+        if self.members.len() <= exact {
+            self.members.resize(exact + 1, BTreeSet::new());
+        }
+        self.members[exact].insert(node);
+        self.next = self.next.max(node.0.saturating_add(1));
+        match self.near.get_mut(node.0 as usize) {
+            Some(place) => *place = Some(entry),
+            None => {
+                self.far.insert(node, entry);
+            }
+        }
+    }
+
+    fn entry(&self, node: NodeId) -> Option<&Entry> {
+        match self.near.get(node.0 as usize) {
+            Some(place) => place.as_ref(),
+            None => self.far.get(&node),
+        }
+    }
+
+    fn entry_mut(&mut self, node: NodeId) -> Option<&mut Entry> {
+        match self.near.get_mut(node.0 as usize) {
+            Some(place) => place.as_mut(),
+            None => self.far.get_mut(&node),
+        }
+    }
+
+    /// All nodes with their types, type by type.
+    pub fn nodes(&self) -> impl Iterator<Item = (NodeId, TypeId)> {
+        let types = (0..).map(TypeId).zip(&self.members);
+        types.flat_map(|(exact, nodes)| nodes.iter().map(move |&node| (node, exact)))
+    }
+
+    /// All edges, by the types of their sources.
+    pub fn edges(&self) -> impl Iterator<Item = EdgeKey> {
+        self.nodes().flat_map(|(from, _)| {
+            let out = self.entry(from).map_or(&[][..], |entry| &entry.out);
+            out.iter()
+                .map(move |&(label, to)| EdgeKey { from, label, to })
+        })
+    }
+
+    pub(super) fn create(&mut self, exact: TypeId) -> NodeId {
+        let node = NodeId(self.next);
+        let (out, into) = (Vec::new(), Vec::new());
+        self.put(node, Entry { exact, out, into });
+        node
+    }
+
+    pub(super) fn retype(&mut self, node: NodeId, exact: TypeId) {
+        if let Some(entry) = self.entry_mut(node) {
+            let before = std::mem::replace(&mut entry.exact, exact);
+            self.members[usize::from(before.0)].remove(&node);
+            self.members[usize::from(exact.0)].insert(node);
+        }
+    }
+
+    pub(super) fn delete(&mut self, node: NodeId) {
+        let gone = match self.near.get_mut(node.0 as usize) {
+            Some(place) => place.take(),
+            None => self.far.remove(&node),
+        };
+        let Some(gone) = gone else { return };
+        self.members[usize::from(gone.exact.0)].remove(&node);
+        for (label, to) in gone.out {
+            if let Some(other) = self.entry_mut(to) {
+                take(&mut other.into, (label, node));
+            }
+        }
+        for (label, from) in gone.into {
+            if let Some(other) = self.entry_mut(from) {
+                take(&mut other.out, (label, node));
+            }
+        }
+    }
+
+    pub(super) fn link(&mut self, key: EdgeKey) {
+        let there = self.entry(key.to).is_some();
+        if there
+            && let Some(from) = self.entry_mut(key.from)
+            && add(&mut from.out, (key.label, key.to))
+            && let Some(to) = self.entry_mut(key.to)
+        {
+            add(&mut to.into, (key.label, key.from));
+        }
+    }
+
+    pub(super) fn unlink(&mut self, key: EdgeKey) {
+        if let Some(from) = self.entry_mut(key.from)
+            && take(&mut from.out, (key.label, key.to))
+            && let Some(to) = self.entry_mut(key.to)
+        {
+            take(&mut to.into, (key.label, key.from));
+            self.renewed.insert(key);
+        }
+    }
+}
+
+/// Ids of nodes of a working graph.
+pub(crate) enum Ids<'a> {
+    Ends(std::slice::Iter<'a, (LabelId, NodeId)>),
+    Members(std::collections::btree_set::Iter<'a, NodeId>),
+    Base(NodeIds<'a>),
+    Nothing,
+}
+
+impl Iterator for Ids<'_> {
+    type Item = Result<NodeId, ReadError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        match self {
+            Self::Ends(ends) => ends.next().map(|&(_, node)| Ok(node)),
+            Self::Members(nodes) => nodes.next().map(|&node| Ok(node)),
+            Self::Base(ids) => ids.next(),
+            Self::Nothing => None,
+        }
+    }
+}
+
+impl Host for WorkingGraph {
+    type Ids<'a> = Ids<'a>;
+    type Edges<'a> = Box<dyn Iterator<Item = Result<EdgeKey, ReadError>> + 'a>;
+
+    fn version(&self) -> Version {
+        self.base.version()
+    }
+
+    fn type_of(&self, node: NodeId) -> Result<Option<TypeId>, ReadError> {
+        Ok(self.entry(node).map(|entry| entry.exact))
+    }
+
+    fn has_edge(&self, key: EdgeKey) -> Result<bool, ReadError> {
+        let end = (key.label, key.to);
+        let from = self.entry(key.from);
+        Ok(from.is_some_and(|from| from.out.binary_search(&end).is_ok()))
+    }
+
+    fn node_value(&self, node: NodeId, attribute: AttributeId) -> Result<Option<Value>, ReadError> {
+        if self.entry(node).is_none() {
+            return Ok(None);
+        }
+        Host::node_value(&self.base, node, attribute)
+    }
+
+    fn edge_value(&self, key: EdgeKey, attribute: AttributeId) -> Result<Option<Value>, ReadError> {
+        if self.renewed.contains(&key) || !self.has_edge(key)? {
+            return Ok(None);
+        }
+        Host::edge_value(&self.base, key, attribute)
+    }
+
+    fn targets(&self, from: NodeId, label: LabelId) -> Result<Option<Ids<'_>>, ReadError> {
+        let from = self.entry(from);
+        Ok(from.map(|from| Ids::Ends(labelled(&from.out, label).iter())))
+    }
+
+    fn sources(&self, to: NodeId, label: LabelId) -> Result<Option<Ids<'_>>, ReadError> {
+        let to = self.entry(to);
+        Ok(to.map(|to| Ids::Ends(labelled(&to.into, label).iter())))
+    }
+
+    fn members(&self, exact: TypeId) -> Ids<'_> {
+        let nodes = self.members.get(usize::from(exact.0));
+        nodes.map_or(Ids::Nothing, |nodes| Ids::Members(nodes.iter()))
+    }
+
+    fn edges(&self, label: LabelId) -> Self::Edges<'_> {
+        Box::new(self.edges().filter(move |key| key.label == label).map(Ok))
+    }
+
+    fn by_value(&self, attribute: AttributeId, range: &ValueRange) -> Ids<'_> {
+        Ids::Base(self.base.ids_by_value(attribute, range))
+    }
+
+    fn count_of_type(&self, exact: TypeId) -> Result<u64, ReadError> {
+        let nodes = self.members.get(usize::from(exact.0));
+        Ok(nodes.map_or(0, |nodes| nodes.len() as u64))
+    }
+
+    /// As the snapshot has them: they guide the search, and rewriting leaves them alike.
+    fn triples(&self, label: LabelId, visit: &mut dyn FnMut(TripleCount)) -> Result<(), ReadError> {
+        Host::triples(&self.base, label, visit)
+    }
+}

@@ -1,0 +1,394 @@
+//! Measuring rules: matches, changes of matches, rewriting and parsing, beside other engines on
+//! the same worlds in the same run. It guarantees that every engine found as many matches.
+
+mod indoor;
+mod peers;
+
+use crate::Failure;
+use dsr::{Graph, NodeId, Snapshot, Time, Transaction};
+use grammar::{Binding, Grammar, Matcher, Rewriter, Watch, WorkingGraph, parse_grammar};
+use indoor::Indoor;
+use peers::Peers;
+use serde_json::{Value as Json, json};
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+const RULES: &str = include_str!("patterns.aggl");
+const SIZES: [(usize, &str); 3] = [(1000, "1k"), (10_000, "10k"), (100_000, "100k")];
+/// How long one quantity is measured.
+const SPAN: Duration = Duration::from_millis(200);
+
+/// One measured quantity.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Quantity {
+    name: String,
+    value: f64,
+    unit: &'static str,
+    /// The same by another engine, and whether that is a lower bound, because it was ended.
+    peer: Option<(f64, bool)>,
+}
+
+impl Quantity {
+    fn new(name: String, value: f64, unit: &'static str) -> Self {
+        Self {
+            name,
+            value,
+            unit,
+            peer: None,
+        }
+    }
+
+    /// How many times faster than the peer.
+    fn ratio(&self) -> Option<f64> {
+        self.peer.map(|(peer, _)| peer / self.value)
+    }
+
+    pub(crate) fn to_json(&self) -> Json {
+        json!({
+            "name": self.name,
+            "value": self.value,
+            "unit": self.unit,
+            "peer": self.peer.map(|(peer, _)| peer),
+            "ratio": self.ratio(),
+        })
+    }
+}
+
+/// The quantities for people.
+pub(crate) fn table(quantities: &[Quantity]) -> String {
+    let number = |number: f64| match number.abs() {
+        size if size >= 1000.0 => format!("{number:.0}"),
+        size if size >= 10.0 => format!("{number:.1}"),
+        _ => format!("{number:.3}"),
+    };
+    let mut text = super::figure::host();
+    // Writing to a string does not fail.
+    let _ = writeln!(
+        text,
+        "\n{:<32}{:>12} {:<13}{:>14}{:>12}",
+        "", "ours", "", "peer's", "faster"
+    );
+    for quantity in quantities {
+        let bound = quantity
+            .peer
+            .filter(|(_, bound)| *bound)
+            .map_or("", |_| ">");
+        let [peer, ratio] = [quantity.peer.map(|(peer, _)| peer), quantity.ratio()].map(|value| {
+            value.map_or_else(String::new, |value| format!("{bound}{}", number(value)))
+        });
+        let Quantity {
+            name, value, unit, ..
+        } = quantity;
+        let value = number(*value);
+        let _ = writeln!(
+            text,
+            "{name:<32}{value:>12} {unit:<13}{peer:>14}{ratio:>12}"
+        );
+    }
+    text
+}
+
+/// Microseconds that `work` takes: the median of as many runs as fit into the span.
+fn median<T>(mut work: impl FnMut() -> Result<T, Failure>) -> Result<f64, Failure> {
+    let mut times = Vec::new();
+    let begun = Instant::now();
+    while times.len() < 5 || begun.elapsed() < SPAN && times.len() < 100_000 {
+        let started = Instant::now();
+        let done = work()?;
+        times.push(started.elapsed().as_secs_f64() * 1e6);
+        drop(done);
+    }
+    Ok(middle(&mut times, 0.5))
+}
+
+fn middle(times: &mut [f64], share: f64) -> f64 {
+    times.sort_by(f64::total_cmp);
+    let at = (times.len() as f64 * share) as usize;
+    times
+        .get(at.min(times.len().saturating_sub(1)))
+        .copied()
+        .unwrap_or(0.0)
+}
+
+/// All quantities.
+pub(crate) fn rules() -> Result<Vec<Quantity>, Failure> {
+    let (grammar, diagnostics) = parse_grammar(RULES, "patterns.aggl");
+    if grammar::has_errors(&diagnostics) {
+        return Err(Failure::Internal(grammar::Defects { diagnostics }.into()));
+    }
+    let grammar = Arc::new(grammar);
+    let peers = Peers::find();
+    let folder = Folder::new()?;
+    let mut quantities = Vec::new();
+    for (size, name) in SIZES {
+        let world = Indoor::new(size);
+        let file = folder.0.join(name);
+        std::fs::write(&file, world.lines()).map_err(Failure::internal)?;
+        let mut graph = world.graph()?;
+        matching(
+            &grammar,
+            &graph.snapshot(),
+            (name, &file, peers.as_ref()),
+            &mut quantities,
+        )?;
+        rewriting(&grammar, &mut graph, &world, name, &mut quantities)?;
+        changing(&grammar, &mut graph, &world, name, &mut quantities)?;
+    }
+    parsing(&mut quantities)?;
+    Ok(quantities)
+}
+
+/// A folder that goes with this value.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new() -> Result<Self, Failure> {
+        let path = std::env::temp_dir().join(format!("cortex-bench-{}", std::process::id()));
+        std::fs::create_dir(&path).map_err(Failure::internal)?;
+        Ok(Self(path))
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        drop(std::fs::remove_dir_all(&self.0));
+    }
+}
+
+/// All matches, the first match, and a search with its planning.
+fn matching(
+    grammar: &Arc<Grammar>,
+    snapshot: &Snapshot,
+    (size, file, peers): (&str, &PathBuf, Option<&Peers>),
+    quantities: &mut Vec<Quantity>,
+) -> Result<(), Failure> {
+    let mut matcher = Matcher::new(Arc::clone(grammar));
+    let free = Binding::new();
+    for rule in &grammar.rules {
+        let name = &rule.name;
+        let mut all = || {
+            let matches = matcher
+                .matches(snapshot, name, &free)
+                .map_err(Failure::internal)?;
+            matches.count_all().map_err(Failure::internal)
+        };
+        let count = all()?;
+        let whole = median(&mut all)?;
+        let first = median(|| {
+            let mut matches = matcher
+                .matches(snapshot, name, &free)
+                .map_err(Failure::internal)?;
+            Ok(matches.next())
+        })?;
+        let planned = median(|| {
+            let matches = grammar
+                .matches(snapshot, rule, &free)
+                .map_err(Failure::internal)?;
+            matches.count_all().map_err(Failure::internal)
+        })?;
+        let named = |what: &str| format!("{what}_{name}_{size}");
+        quantities.push(Quantity::new(named("matches"), count as f64, "matches"));
+        quantities.push(Quantity::new(named("first"), first, "us"));
+        quantities.push(Quantity::new(named("plan_and_all"), planned, "us"));
+        quantities.push(Quantity::new(named("all"), whole, "us"));
+        for engine in ["vf2", "sqlite"] {
+            let Some(peers) = peers else { continue };
+            let found = peers.all(engine, file, &words(rule))?;
+            if found.count.is_some_and(|found| found != count) {
+                let told = format!("{engine} finds {found:?} matches of {name}, not {count}");
+                return Err(Failure::internal(told));
+            }
+            let mut beside = Quantity::new(format!("{}_{engine}", named("all")), whole, "us");
+            beside.peer = Some((found.seconds * 1e6, found.count.is_none()));
+            quantities.push(beside);
+        }
+    }
+    Ok(())
+}
+
+/// A rule's left side, as the peers read it.
+fn words(rule: &grammar::Rule) -> String {
+    let nodes = rule.left.nodes.iter();
+    let nodes = nodes.map(|node| format!("{}:{}", node.variable, node.type_name));
+    let edges = rule.left.edges.iter();
+    let edges = edges.map(|edge| format!("{}-{}-{}", edge.from, edge.label, edge.to));
+    nodes.chain(edges).collect::<Vec<_>>().join(" ")
+}
+
+/// Millions of `changeRoom` a second, each found and made for one robot after the other: in a
+/// working graph, and for comparison as commits to a graph of this process, by name and binding.
+fn rewriting(
+    grammar: &Arc<Grammar>,
+    graph: &mut Graph,
+    world: &Indoor,
+    size: &str,
+    quantities: &mut Vec<Quantity>,
+) -> Result<(), Failure> {
+    let snapshot = graph.snapshot();
+    let mut working = WorkingGraph::of(&snapshot).map_err(Failure::internal)?;
+    let rewriter = Rewriter::new(grammar, "changeRoom", &snapshot);
+    let mut rewriter = rewriter.map_err(Failure::internal)?;
+    let slot = rewriter.slot("r").unwrap_or_default();
+    let kinds = world.nodes.iter().enumerate();
+    let robots = kinds.filter(|(_, kind)| **kind == "robot");
+    let robots: Vec<NodeId> = robots.map(|(index, _)| NodeId(index as u64 + 1)).collect();
+    let mut done = 0_u32;
+    let started = Instant::now();
+    while started.elapsed() < SPAN {
+        for robot in robots.iter().cycle().take(1000) {
+            let rewritten = rewriter.rewrite(&mut working, &[(slot, *robot)]);
+            done += u32::from(rewritten.map_err(Failure::internal)?);
+        }
+    }
+    let rate = f64::from(done) / started.elapsed().as_secs_f64() / 1e6;
+    quantities.push(Quantity::new(format!("rewrites_{size}"), rate, "million/s"));
+
+    graph.set_rules(Arc::clone(grammar) as Arc<dyn dsr::RuleEngine>);
+    let mut matcher = Matcher::new(Arc::clone(grammar));
+    let mut done = 0_u32;
+    let started = Instant::now();
+    while started.elapsed() < SPAN {
+        let robot = robots[done as usize % robots.len()];
+        let at: Binding = [("r", robot)].into_iter().collect();
+        let snapshot = graph.snapshot();
+        let found = matcher.matches(&snapshot, "changeRoom", &at);
+        let found = found.map_err(Failure::internal)?.next().transpose();
+        let Some(found) = found.map_err(Failure::internal)? else {
+            return Err(Failure::internal("a robot cannot leave its room"));
+        };
+        let mut transaction = Transaction::new();
+        transaction.apply_rule("changeRoom", found.to_refs());
+        let committed = graph.commit(&transaction, "bench", Time::default());
+        committed.map_err(Failure::internal)?;
+        done += 1;
+    }
+    let rate = f64::from(done) / started.elapsed().as_secs_f64() / 1e6;
+    quantities.push(Quantity::new(format!("commits_{size}"), rate, "million/s"));
+    Ok(())
+}
+
+/// What it takes a watch over all rules to take in that a robot left or entered a room.
+fn changing(
+    grammar: &Arc<Grammar>,
+    graph: &mut Graph,
+    world: &Indoor,
+    size: &str,
+    quantities: &mut Vec<Quantity>,
+) -> Result<(), Failure> {
+    let names: Vec<&str> = grammar
+        .rules
+        .iter()
+        .map(|rule| rule.name.as_str())
+        .collect();
+    let watch = Watch::new(Arc::clone(grammar), &names, &graph.snapshot());
+    let mut watch = watch.map_err(Failure::internal)?;
+    let rooms = world.nodes.iter().filter(|kind| **kind == "room").count();
+    let id = |index: usize| NodeId(index as u64 + 1);
+    let start = graph.snapshot();
+    let within = start.schema().find_label("in");
+    let mut places = Vec::new();
+    for (robot, _) in world
+        .nodes
+        .iter()
+        .enumerate()
+        .filter(|(_, kind)| **kind == "robot")
+    {
+        let node = start.find_node(id(robot)).map_err(Failure::internal)?;
+        let rooms = node
+            .zip(within)
+            .map(|(node, within)| node.targets_of(within));
+        for room in rooms.into_iter().flatten() {
+            places.push((robot, room.map_err(Failure::internal)?.0 as usize - 1));
+        }
+    }
+    let mut times = Vec::new();
+    for turn in 0..4000 {
+        let robot = turn / 2 % places.len();
+        let (node, room) = places[robot];
+        let mut transaction = Transaction::new();
+        if turn % 2 == 0 {
+            transaction.delete_edge(id(node), "in", id(room));
+        } else {
+            places[robot].1 = (room + 1) % rooms;
+            transaction.create_edge(id(node), "in", id(places[robot].1));
+        }
+        let committed = graph.commit(&transaction, "bench", Time::default());
+        let (_, change) = committed.map_err(Failure::internal)?;
+        let snapshot = graph.snapshot();
+        let started = Instant::now();
+        let delta = watch
+            .update(&change, &snapshot)
+            .map_err(Failure::internal)?;
+        times.push(started.elapsed().as_secs_f64() * 1e6);
+        drop(delta);
+    }
+    let snapshot = graph.snapshot();
+    for rule in &grammar.rules {
+        let fresh = grammar
+            .matches(&snapshot, rule, &Binding::new())
+            .map_err(Failure::internal)?;
+        let fresh = fresh.count_all().map_err(Failure::internal)?;
+        if fresh != watch.count(&rule.name) as u64 {
+            let told = format!(
+                "the watch has other matches of {} than there are",
+                rule.name
+            );
+            return Err(Failure::internal(told));
+        }
+    }
+    for (what, share) in [("delta", 0.5), ("delta_99_percent", 0.99)] {
+        let name = format!("{what}_{size}");
+        quantities.push(Quantity::new(name, middle(&mut times, share), "us"));
+    }
+    Ok(())
+}
+
+/// Megabytes of rules a second.
+fn parsing(quantities: &mut Vec<Quantity>) -> Result<(), Failure> {
+    let (head, rules) = RULES.rsplit_once("===").unwrap_or_default();
+    let mut text = format!("{head}===");
+    let names = ["changeRoom", "deliver", "wants_here", "near_far"];
+    for copy in 0..500 {
+        let mut renamed = rules.to_owned();
+        for name in names {
+            renamed = renamed.replace(&format!("{name} :"), &format!("{name}{copy} :"));
+        }
+        text.push_str(&renamed);
+    }
+    let time = median(|| {
+        let (grammar, diagnostics) = parse_grammar(&text, "many.aggl");
+        if grammar::has_errors(&diagnostics) {
+            return Err(Failure::Internal(grammar::Defects { diagnostics }.into()));
+        }
+        Ok(grammar)
+    })?;
+    quantities.push(Quantity::new(
+        "parse".to_owned(),
+        text.len() as f64 / time,
+        "MB/s",
+    ));
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_peer_that_was_ended_is_told_as_a_lower_bound() {
+        let mut quantity = Quantity::new("all_deliver_100k_vf2".to_owned(), 20.0, "us");
+        assert_eq!(quantity.to_json()["ratio"], Json::Null);
+        quantity.peer = Some((60_000.0, true));
+        assert_eq!(quantity.to_json()["ratio"], 3000.0);
+        assert!(table(&[quantity]).contains(">3000"));
+    }
+
+    #[test]
+    fn peers_read_a_left_side_as_words() {
+        let (grammar, _) = parse_grammar(RULES, "patterns.aggl");
+        let expected = "r:robot a:room b:room r-in-a a-connected-b";
+        assert_eq!(words(&grammar.rules[0]), expected);
+    }
+}
