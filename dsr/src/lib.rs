@@ -10,6 +10,7 @@
 mod arena;
 mod change;
 mod graph;
+mod hot;
 mod ids;
 pub mod interchange;
 pub mod json;
@@ -36,8 +37,8 @@ pub use schema::{
     AttributeType, Label, NameKind, NodeType, Schema, SchemaError, SchemaFileError, suggest,
 };
 pub use shm::{
-    AttachError, BareClient, BareServer, Changes, ClockError, CommitError, Instance, InstanceError,
-    Publisher, Session, Store, StoreError, Subscriber, Tick, Update,
+    AttachError, BareClient, BareServer, Changes, ClockError, CommitError, HotAttribute, HotError,
+    Instance, InstanceError, Publisher, Session, Store, StoreError, Subscriber, Tick, Update,
 };
 pub use snapshot::{
     Attribute, Edge, Edges, Element, Neighbors, Node, NodeIds, Snapshot, TransformError,

@@ -14,6 +14,7 @@ pub use petgraph::{Edges, Neighbors};
 use crate::arena::record;
 use crate::arena::tree::{self, Key};
 use crate::arena::{Address, Arena, ReadError, Root, Word, trie};
+use crate::hot::Hot;
 use crate::shm::Segment;
 use crate::value::{hash, place};
 use crate::{
@@ -65,6 +66,8 @@ pub struct Snapshot {
     pub(crate) schema: Arc<Schema>,
     /// The nodes in order of their ids, once somebody counts them.
     index: OnceLock<Arc<[NodeId]>>,
+    /// What owners give out beside the graph.
+    hot: Option<Hot>,
 }
 
 /// Which values of an attribute to look for in its index.
@@ -94,6 +97,7 @@ impl Snapshot {
             root,
             schema,
             index: OnceLock::new(),
+            hot: None,
         }
     }
 
@@ -120,6 +124,19 @@ impl Snapshot {
         let bytes = record::read_blob(&arena, root.schema).map_err(|_| damaged)?;
         let schema: Schema = postcard::from_bytes(&bytes).map_err(|_| damaged)?;
         Ok(Self::new(Arc::new(arena), root, Arc::new(schema)))
+    }
+
+    /// The snapshot with what owners give out beside the graph.
+    pub(crate) fn with_hot(mut self, hot: Option<Hot>) -> Self {
+        self.hot = hot;
+        self
+    }
+
+    /// The same version without hot values: every attribute is as it was committed, however often
+    /// it is read.
+    #[must_use]
+    pub fn committed(&self) -> Self {
+        self.clone().with_hot(None)
     }
 
     /// The version that this is the state of.

@@ -120,6 +120,52 @@ pub(super) fn visible(
     Ok(())
 }
 
+/// From the call of `set` of a hot pose in one process until another has read it.
+pub(super) fn hot(
+    hall: &Hall,
+    effort: Effort,
+    raw: f64,
+    figures: &mut Vec<Figure>,
+) -> Result<(), Failure> {
+    let owner = hall.ready("pose", &[])?;
+    let mut session = hall.session("seer")?;
+    let deadline = Instant::now() + PATIENCE;
+    let mut samples = Vec::new();
+    let mut last = 0;
+    while samples.len() < effort.stamps as usize {
+        // A snapshot for a while, as an agent's turn has one.
+        let snapshot = session.snapshot().map_err(Failure::internal)?;
+        let name = snapshot.schema().attribute_id("p");
+        let name = name.map_err(Failure::internal)?;
+        let node = snapshot.find_node(NodeId(1)).map_err(Failure::internal)?;
+        let node = node.ok_or_else(|| Failure::internal("no node 1"))?;
+        for _ in 0..1000 {
+            let read = node.attribute(name).map_err(Failure::internal)?;
+            let seen = peer::clock();
+            let stamp = read.map_or(0, |read| read.time.nanoseconds().cast_unsigned());
+            if stamp > last {
+                // The first may have been there for long.
+                if last > 0 {
+                    samples.push(seen.saturating_sub(stamp));
+                }
+                last = stamp;
+            }
+        }
+        if Instant::now() > deadline {
+            return Err(Failure::internal("the hot poses stopped coming"));
+        }
+    }
+    owner.end()?;
+    figures.push(Figure {
+        name: "hot_pose_visible",
+        value: median(&mut samples) / 1e3,
+        unit: "us",
+        raw: Some(raw),
+        peer: "iceoryx2 round trip, polling".to_owned(),
+    });
+    Ok(())
+}
+
 /// As [`polling`], with ends that sleep until they are woken.
 pub(super) fn blocking(
     hall: &Hall,

@@ -86,6 +86,7 @@ pub(crate) fn graph(effort: Effort) -> Result<Vec<Figure>, Failure> {
         commits::visible(&hall, effort, raw, &mut figures)?;
         reads::all(&hall, effort, &mut figures)?;
         commits::flat_out(&hall, effort, raw, &mut figures)?;
+        commits::hot(&hall, effort, raw, &mut figures)?;
         store.end()?;
     }
     {

@@ -3,7 +3,7 @@
 
 use crate::{Answer, Failure};
 use dsr::{
-    BareServer, Instance, Limits, NodeId, ReadError, Schema, Session, Snapshot, Store, Time,
+    BareServer, Instance, Limits, NodeId, Owner, ReadError, Schema, Session, Snapshot, Store, Time,
     Transaction, Value,
 };
 use nalgebra::{Isometry2, Vector2};
@@ -33,6 +33,7 @@ pub(crate) fn play(role: &str, instance: &str, numbers: &[u64]) -> Result<Answer
         ),
         "bare" => bare(&instance, Duration::from_micros(number(0))),
         "stamp" => stamp(&instance, number(0)),
+        "pose" => pose(&instance),
         "reader" => reader(&instance),
         "join" => join(&instance, false),
         "copy" => join(&instance, true),
@@ -98,7 +99,9 @@ fn store(
     spin: Duration,
     history: Option<usize>,
 ) -> Result<(), Failure> {
-    let mut store = Store::open(instance, Schema::open()).map_err(Failure::internal)?;
+    let schema = "open = true\n[attributes]\np = { kind = \"pose\", hot = 10.0 }\n";
+    let schema = Schema::from_toml("bench", schema).map_err(Failure::internal)?;
+    let mut store = Store::open(instance, schema).map_err(Failure::internal)?;
     if let Some(history_bytes) = history {
         store.graph_mut().set_limits(Limits { history_bytes });
     }
@@ -161,6 +164,27 @@ pub(super) fn read_stamp(snapshot: &Snapshot) -> Result<Option<(u64, u64)>, Read
         Some(Value::U64List(row)) => row.first_chunk().map(|&[number, time]| (number, time)),
         _ => None,
     })
+}
+
+/// Gives out a pose with the time, again and again.
+fn pose(instance: &Instance) -> Result<(), Failure> {
+    let mut session = attach(instance, "driver")?;
+    let owner = Owner::Node(NodeId(1).into());
+    let mut pose = session.hot(owner, "p").map_err(Failure::internal)?;
+    let ended = end_of_input();
+    say("ready")?;
+    let mut n = 0.0;
+    while !ended.load(Ordering::Acquire) {
+        let pause = Instant::now();
+        while pause.elapsed() < Duration::from_micros(50) {
+            std::hint::spin_loop();
+        }
+        n += 1.0;
+        let value = Value::from(Isometry2::new(Vector2::new(n, n), 0.5));
+        let time = Time::from_nanoseconds(clock().cast_signed());
+        pose.set(value, time).map_err(Failure::internal)?;
+    }
+    Ok(())
 }
 
 /// An agent that looks a thousand times a second.

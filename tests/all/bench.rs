@@ -33,6 +33,7 @@ fn the_graphs_figures_are_all_there_and_no_process_or_memory_of_theirs_is_left()
             "attach_100k",
             "private_memory_per_agent",
             "torn_reads",
+            "hot_pose_visible",
         ]
     );
     for figure in &figures {

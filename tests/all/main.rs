@@ -14,6 +14,7 @@ mod examples;
 mod faults;
 mod graph;
 mod hostile;
+mod hot;
 mod missions;
 mod path;
 mod plan;

@@ -29,6 +29,8 @@ fn main() -> Outcome {
     let instance = Instance::new(instance)?;
     let number = |index: usize| rest.get(index).map_or(Ok(0), |text| text.parse::<u64>());
     match role.as_str() {
+        "hot-store" => hot_store(&instance),
+        "hot-owner" => hot_owner(&instance),
         "store" => store(&instance),
         "join" => join(&instance),
         "store-with-state" => store_with_state(&instance, rest),
@@ -139,6 +141,50 @@ fn write_durable(instance: &Instance, client: u64) -> Outcome {
             session.commit(&transaction, Time::default())?;
         }
     }
+}
+
+/// A store in whose graph a robot's pose is hot.
+fn hot_store(instance: &Instance) -> Outcome {
+    let text = "open = true\n[attributes]\npose = { kind = \"pose\", hot = 100.0 }\n";
+    let mut store = Store::open(instance, Schema::from_toml("test", text)?)?;
+    let mut transaction = Transaction::new();
+    transaction.create_node("robot", "robot", vec![("pose".into(), place(0).into())]);
+    store.commit(&transaction, Time::default())?;
+    println!("ready");
+    let ended = end_of_input();
+    while !ended.load(Ordering::Acquire) {
+        store.serve(Duration::from_millis(20))?;
+    }
+    Ok(())
+}
+
+fn place(n: i64) -> dsr::Pose {
+    dsr::Pose::translation(n as f64, n as f64, n as f64)
+}
+
+/// Gives out the robot's pose as fast as it can, a microsecond of its time apart, on from where it
+/// was, and folds it in.
+fn hot_owner(instance: &Instance) -> Outcome {
+    let mut session = Session::attach(instance, "driver", PATIENCE)?;
+    let mut pose = session.hot(dsr::Owner::Node("robot".into()), "pose")?;
+    let snapshot = session.snapshot()?;
+    let robot = snapshot.find_node_by_name("robot")?.ok_or("no robot")?;
+    let value = robot.value("pose")?;
+    let start = value.as_ref().and_then(Value::as_pose).ok_or("no pose")?;
+    let mut n = start.translation.x as i64;
+    println!("ready");
+    let ended = end_of_input();
+    while !ended.load(Ordering::Acquire) {
+        n += 1;
+        let time = Time::from_nanoseconds(n * 1000);
+        pose.set(place(n), time)?;
+        let mut transaction = Transaction::new();
+        if pose.fold_into(&mut transaction) {
+            session.commit(&transaction, time)?;
+        }
+    }
+    println!("{n}");
+    Ok(())
 }
 
 /// How many nodes every transaction of `write-pairs` writes the same number to.

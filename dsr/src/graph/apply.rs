@@ -327,6 +327,7 @@ impl<'a> Work<'a> {
                     max: None,
                     index: false,
                     history: 0,
+                    hot: None,
                 };
                 Ok(schema.add_attribute(attribute)?)
             }

@@ -11,6 +11,8 @@ use toml::Spanned;
 
 /// How many values of an attribute can be kept.
 const HISTORY: std::ops::RangeInclusive<u64> = 2..=4096;
+/// How many times a second a hot attribute may be folded into the graph.
+const HOT: std::ops::RangeInclusive<f64> = 0.01..=1000.0;
 
 /// What is wrong with a schema file, and where.
 #[derive(Debug, Clone, Error, Diagnostic)]
@@ -57,17 +59,36 @@ struct AttributeRow {
     max: Option<f64>,
     index: Option<Spanned<bool>>,
     history: Option<Spanned<u64>>,
+    hot: Option<Spanned<f64>>,
+}
+
+/// What is wrong with a history of so many values.
+fn why_no_history(history: u64) -> Option<String> {
+    let (least, most) = (HISTORY.start(), HISTORY.end());
+    let wrong = !HISTORY.contains(&history);
+    wrong.then(|| format!("a history has {least} to {most} values"))
+}
+
+/// What is wrong with that rate of a hot attribute.
+fn why_not_hot(kind: ValueKind, rate: f64) -> Option<String> {
+    if !crate::hot::has_fixed_size(kind) {
+        return Some(format!("a {} cannot be hot", kind.name()));
+    }
+    let (least, most) = (HOT.start(), HOT.end());
+    let wrong = !HOT.contains(&rate);
+    wrong.then(|| format!("a hot attribute is folded in {least} to {most} times a second"))
 }
 
 impl Schema {
     /// Reads a schema file: `types` maps each type to its parents, `labels` each label to the
     /// types it may start `from` and end at (`to`), `attributes` each attribute to its `kind`
-    /// (see [`ValueKind::name`]), `unit`, `min`, `max`, `index` and `history`. `open = true` lets
+    /// (see [`ValueKind::name`]), `unit`, `min`, `max`, `index`, `history` and `hot`. `open = true` lets
     /// other names in.
     ///
     /// # Errors
     /// Broken TOML, an unknown key, kind or type name, an index of what has no order and is no
-    /// text, a history that is too short or too long; with its place in the file.
+    /// text, a history that is too short or too long, a rate of what cannot be hot; with its place in
+    /// the file.
     pub fn from_toml(file_name: &str, text: &str) -> Result<Self, SchemaFileError> {
         let error = |message: String, span: Option<std::ops::Range<usize>>, help| SchemaFileError {
             message,
@@ -143,14 +164,16 @@ impl Schema {
             }
             let history = row.history.as_ref().map_or(0, |history| *history.get_ref());
             if let Some(asked) = row.history
-                && !HISTORY.contains(&history)
+                && let Some(message) = why_no_history(history)
             {
-                let message = format!(
-                    "a history has {} to {} values",
-                    HISTORY.start(),
-                    HISTORY.end()
-                );
                 return Err(error(message, Some(asked.span()), None));
+            }
+            let hot = row.hot.as_ref().map(|rate| *rate.get_ref());
+            if let Some(asked) = row.hot
+                && let Some(message) = why_not_hot(kind, *asked.get_ref())
+            {
+                let help = "poses, vectors, numbers and bools can be".to_owned();
+                return Err(error(message, Some(asked.span()), Some(help)));
             }
             let attribute = AttributeType {
                 name: name.get_ref().clone(),
@@ -160,6 +183,7 @@ impl Schema {
                 max: row.max,
                 index,
                 history: history as u16,
+                hot,
             };
             schema
                 .add_attribute(attribute)
@@ -209,6 +233,17 @@ mod tests {
             (message.as_str(), place.as_str()),
             ("a history has 2 to 4096 values", "1")
         );
+    }
+
+    #[test]
+    fn what_cannot_be_hot_is_pointed_at() {
+        let (message, place) = place_of("[attributes]\nx = { kind = \"string\", hot = 10.0 }\n");
+        assert_eq!(
+            (message.as_str(), place.as_str()),
+            ("a string cannot be hot", "10.0")
+        );
+        let (message, _) = place_of("[attributes]\nx = { kind = \"pose\", hot = 0.0 }\n");
+        assert!(message.contains("0.01 to 1000 times a second"), "{message}");
     }
 
     #[test]

@@ -49,6 +49,8 @@ pub struct AttributeType {
     pub index: bool,
     /// How many of its values are kept, the newest among them; 0 for no history.
     pub history: u16,
+    /// Its owner may give it out beside the graph, and folds it in so many times a second.
+    pub hot: Option<f64>,
 }
 
 /// The names a graph may use.
@@ -155,6 +157,20 @@ impl Schema {
     pub fn has_index(&self, attribute: AttributeId) -> bool {
         let known = self.parts.attributes.get(usize::from(attribute.0));
         known.is_some_and(|attribute| attribute.index)
+    }
+
+    /// Whether any attribute is hot.
+    pub fn has_hot(&self) -> bool {
+        self.parts
+            .attributes
+            .iter()
+            .any(|found| found.hot.is_some())
+    }
+
+    /// How many times a second the attribute's owner folds it into the graph, where it is hot.
+    #[inline]
+    pub fn hot_rate(&self, attribute: AttributeId) -> Option<f64> {
+        self.parts.attributes.get(usize::from(attribute.0))?.hot
     }
 
     /// How many values of the attribute are kept, the newest among them; 0 for no history.

@@ -184,6 +184,10 @@ impl Current {
         found.clone()
     }
 
+    pub(super) fn epoch(&self) -> Option<Epoch> {
+        self.arena()?.epoch()
+    }
+
     fn set(&self, arena: Arc<Arena>) {
         *self.0.write().unwrap_or_else(PoisonError::into_inner) = Some(arena);
     }

@@ -12,13 +12,17 @@ use commit::{ASKED, SPIN};
 
 use super::arena::ArenaSubscriber;
 use super::changes::Changes;
+use super::hot::{HotAttribute, HotError, HotSubscriber, OwnPage};
 use super::{
     Instance, InstanceError, Ipc, IpcNode, MAX_PROCESSES, Publisher, Subscriber, ipc, now,
     one_at_a_time, pause, service_name, wait,
 };
 use crate::arena::Arena;
 use crate::arena::record;
-use crate::{Epoch, Filter, ReadError, Schema, Snapshot, Time};
+use crate::hot::{Hot, Key};
+use crate::{
+    AttributeId, EdgeKey, Epoch, Filter, NodeId, NodeRef, Owner, ReadError, Schema, Snapshot, Time,
+};
 use iceoryx2::port::client::Client;
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
@@ -97,6 +101,10 @@ pub struct Session {
     client: Client<Ipc, [u8], (), [u8], ()>,
     wake_store: Notifier<Ipc>,
     clock: Option<(Listener<Ipc>, Subscriber<Tick>)>,
+    /// The pages of hot attributes, once the schema has some.
+    hot: Option<HotSubscriber>,
+    /// This session's own.
+    page: Option<Arc<OwnPage>>,
     id: u64,
     sequence: u64,
     spin: Duration,
@@ -136,6 +144,8 @@ impl Session {
             client,
             wake_store,
             clock: None,
+            hot: None,
+            page: None,
             id: new_session_id(),
             sequence: 0,
             spin: SPIN,
@@ -266,8 +276,60 @@ impl Session {
                     schema
                 }
             };
-            return Ok(Snapshot::new(Arc::clone(&arena), root, schema));
+            let hot = self.hot_of(epoch, &schema)?;
+            return Ok(Snapshot::new(Arc::clone(&arena), root, schema).with_hot(hot));
         }
+    }
+
+    /// What owners give out beside a graph with that schema.
+    fn hot_of(&mut self, epoch: Epoch, schema: &Schema) -> Result<Option<Hot>, InstanceError> {
+        if self.hot.is_none() && schema.has_hot() {
+            self.hot = Some(HotSubscriber::open(&self.node)?);
+        }
+        let Some(hot) = &mut self.hot else {
+            return Ok(None);
+        };
+        Ok(hot.poll()?.map(|pages| Hot { pages, epoch }))
+    }
+
+    /// Makes this process the one that gives out an attribute beside the graph, so that it can be
+    /// written a thousand times a second. The schema says that it is `hot`; the graph has a first
+    /// value of it. Only one process may do so at a time; who reads takes the newest.
+    ///
+    /// # Errors
+    /// [`HotError`].
+    pub fn hot(&mut self, owner: Owner, name: &str) -> Result<HotAttribute, HotError> {
+        let snapshot = self.snapshot()?;
+        let schema = Arc::clone(&snapshot.schema);
+        let attribute = schema.attribute_id(name)?;
+        let Some(rate) = schema.hot_rate(attribute) else {
+            let attribute = name.to_owned();
+            return Err(HotError::NotHot { attribute });
+        };
+        let key = hot_key(&snapshot, &owner, attribute).map_err(AttachError::from)?;
+        let Some(key) = key else {
+            let attribute = name.to_owned();
+            return Err(HotError::NotFound { attribute, owner });
+        };
+        let page = match &self.page {
+            Some(page) => Arc::clone(page),
+            None => Arc::new(OwnPage::open(&self.node, &self.agent)?),
+        };
+        self.page = Some(Arc::clone(&page));
+        let slot = page.claim(key).ok_or(HotError::Full)?;
+        Ok(HotAttribute {
+            page,
+            slot,
+            owner,
+            name: name.to_owned(),
+            schema,
+            attribute,
+            current: self.arena.current.clone(),
+            interval: rate.recip(),
+            folded: None,
+            last: None,
+            scratch: Vec::new(),
+        })
     }
 
     /// Follows the commits that pass `filter`, from now on.
@@ -348,6 +410,39 @@ impl Session {
         }
         wait(listener, patience, "waiting for a tick")?;
         Ok(ticks.newest()?)
+    }
+}
+
+/// The key of an attribute in a page, where the graph has the attribute.
+fn hot_key(
+    snapshot: &Snapshot,
+    owner: &Owner,
+    attribute: AttributeId,
+) -> Result<Option<Key>, ReadError> {
+    let find = |node: &NodeRef| match node {
+        NodeRef::Id(id) => snapshot.find_node(*id),
+        NodeRef::Name(name) => snapshot.find_node_by_name(name),
+    };
+    let id = |node| Ok(find(node)?.map(|node| node.id()));
+    match owner {
+        Owner::Node(node) => {
+            let Some(node) = find(node)? else {
+                return Ok(None);
+            };
+            let there = node.attribute(attribute)?;
+            Ok(there.map(|_| Key::of_node(node.id(), attribute)))
+        }
+        Owner::Edge(edge) => {
+            let label = snapshot.schema().find_label(&edge.label);
+            let ends: (Option<NodeId>, Option<NodeId>) = (id(&edge.from)?, id(&edge.to)?);
+            let (Some(label), (Some(from), Some(to))) = (label, ends) else {
+                return Ok(None);
+            };
+            let key = EdgeKey { from, label, to };
+            let edge = snapshot.find_edge(key)?;
+            let there = edge.map(|edge| edge.attribute(attribute)).transpose()?;
+            Ok(there.flatten().map(|_| Key::of_edge(key, attribute)))
+        }
     }
 }
 

@@ -5,6 +5,7 @@ use super::{NodeIds, Scan, Snapshot};
 use crate::arena::record;
 use crate::arena::table::{self, AttributeRecord, Place};
 use crate::arena::{Address, ReadError, Word};
+use crate::hot::Key;
 use crate::{AttributeId, EdgeKey, LabelId, NodeId, Time, TypeId, Value, Version, WriterId};
 use std::ops::Deref;
 
@@ -115,7 +116,9 @@ impl<'a> Element<'a> {
         }
     }
 
-    /// One attribute, if it is there.
+    /// One attribute, if it is there. Where its owner gives out a newer value beside the graph (see
+    /// [`Session::hot`](crate::Session::hot)), that one, with its time; version and writer are those of
+    /// the last commit.
     ///
     /// # Errors
     /// [`ReadError`].
@@ -130,7 +133,37 @@ impl<'a> Element<'a> {
             .find(|&row| table::name_of(row) == name.0);
         let record = row.map(|row| self.decode(table, row)).transpose();
         let record = self.snapshot.genuine(record)?;
-        Ok(record.map(|record| written(name, record)))
+        Ok(record.map(|record| written(name, self.newest(name, record))))
+    }
+
+    /// What its owner gives out of a hot attribute takes the place of what was committed before.
+    #[inline]
+    fn newest(&self, name: AttributeId, committed: AttributeRecord) -> AttributeRecord {
+        let hot = self.snapshot.hot.as_ref();
+        let hot = hot.filter(|_| self.snapshot.schema.hot_rate(name).is_some());
+        let found = hot.and_then(|hot| hot.read(self.key_of(name)?));
+        match found {
+            Some(hot) if hot.time > committed.time => AttributeRecord {
+                value: hot.value,
+                time: hot.time,
+                ..committed
+            },
+            _ => committed,
+        }
+    }
+
+    fn key_of(&self, name: AttributeId) -> Option<Key> {
+        let [first, second, third] = self.words.first_chunk()?.each_ref().map(Word::load);
+        Some(if self.layout.kind == NODE.kind {
+            Key::of_node(NodeId(first), name)
+        } else {
+            let edge = EdgeKey {
+                from: NodeId(first),
+                label: LabelId(third as u16),
+                to: NodeId(second),
+            };
+            Key::of_edge(edge, name)
+        })
     }
 
     /// The values of an attribute that are kept, newest first: as many as the schema's `history`
@@ -217,7 +250,8 @@ impl<'a> Element<'a> {
             .map(|row| {
                 let row = row.load();
                 let record = self.snapshot.genuine(self.decode(table, row))?;
-                Ok(written(AttributeId(table::name_of(row)), record))
+                let name = AttributeId(table::name_of(row));
+                Ok(written(name, self.newest(name, record)))
             })
             .collect()
     }

@@ -88,6 +88,7 @@ pub(super) fn with_indices() -> Schema {
             max: None,
             index: true,
             history: 0,
+            hot: None,
         };
         schema.add_attribute(attribute).unwrap();
     }
