@@ -3,10 +3,12 @@
 mod bench;
 mod mission;
 mod path;
+mod social;
 
 pub(crate) use bench::{Bench, BenchAction, BenchPeer};
 pub(crate) use mission::{Mission, MissionAction, SubmitMission};
 pub(crate) use path::{CostModel, Path, PathAlgorithm};
+pub(crate) use social::{Experiment, Social, SocialAction, SocialPicture};
 
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -64,6 +66,14 @@ pub(crate) enum Verb {
     Path(Path),
     #[command(hide = true)]
     BenchPeer(BenchPeer),
+    /// People and the space they need: groups, how little a place suits a robot
+    #[command(after_help = "Example:\n  cortex social groups recording.json --json")]
+    Social(Social),
+    /// Do the papers' tables and figures again, ours beside what is printed
+    #[command(
+        after_help = "Examples:\n  cortex experiment list\n  cortex experiment fd-table1 --json"
+    )]
+    Experiment(Experiment),
 }
 
 /// Which running system.

@@ -14,6 +14,8 @@ pub mod process;
 pub mod report;
 mod resume;
 pub mod scenario;
+pub mod scenes;
+pub mod situation;
 pub mod tracks;
 pub mod world;
 

@@ -8,6 +8,7 @@ mod object_space;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use object_space::mapped;
 pub use object_space::{ObjectSpace, SpacesError, object_spaces};
 
 use crate::world::{Collisions, Truth, wrap};

@@ -11,10 +11,12 @@ mod map;
 mod path;
 mod people;
 mod png;
+mod social;
 #[cfg(test)]
 mod tests;
 
 pub use png::{PngError, png};
+pub use social::{Show, social};
 
 use crate::metrics::{Encounter, Metrics, ObjectSpace, closest_encounter, in_order};
 use crate::scenario::Scenario;

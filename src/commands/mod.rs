@@ -2,6 +2,7 @@
 
 mod agent;
 mod bench;
+mod experiment;
 mod graph;
 mod mission;
 mod output;
@@ -9,6 +10,7 @@ mod path;
 mod plan;
 mod rules;
 mod run;
+mod social;
 mod store;
 
 pub(crate) use agent::AGENTS;
@@ -37,6 +39,8 @@ pub(crate) fn perform(verb: Verb) -> Result<Answer, Failure> {
         Verb::BenchPeer(arguments) => {
             crate::bench::play(&arguments.role, &arguments.instance, &arguments.numbers)
         }
+        Verb::Social(arguments) => social::run(&arguments),
+        Verb::Experiment(arguments) => experiment::run(&arguments),
     }
 }
 

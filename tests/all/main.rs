@@ -20,6 +20,7 @@ mod path;
 mod plan;
 mod rules;
 mod run;
+mod social;
 mod state;
 mod support;
 mod tree;

@@ -2,9 +2,9 @@
 //! items 1 and 2). This file owns the curve and its contours; both are exact, in the person's own
 //! frame, so the surface is continuous everywhere.
 
+use super::four_sided::FourSided;
 use nalgebra::{Isometry2, Point2};
 use serde::{Deserialize, Serialize};
-use std::f64::consts::{FRAC_PI_2, PI};
 
 /// How long a walking person's way ahead counts as theirs, seconds. With the `hall` widths a runner
 /// (2 m/s) gets the front width 2.0 m that AP prints for running.
@@ -55,56 +55,35 @@ impl AsymmetricGaussian {
             .all(|s| s.is_finite() && *s > 0.0)
     }
 
-    /// The squared distance of a place from the person in units of the standard deviations;
-    /// `place` is in the person's own frame (x ahead, y left), metres.
+    /// With a width for each of the four sides.
+    pub fn four_sided(&self) -> FourSided {
+        (*self).into()
+    }
+
+    /// See [`FourSided::squared_deviation`].
     pub fn squared_deviation(&self, place: Point2<f64>) -> f64 {
-        let along = if place.x >= 0.0 {
-            self.front
-        } else {
-            self.rear
-        };
-        (place.x / along).powi(2) + (place.y / self.side).powi(2)
+        self.four_sided().squared_deviation(place)
     }
 
     /// The density at `point` (world frame) of a person at `world_from_person`: 1 at the person,
     /// falling to 0. Equals Kirby's rotated form with its factor 2 (READING.md item 1).
     pub fn density(&self, world_from_person: &Isometry2<f64>, point: Point2<f64>) -> f64 {
-        let place = world_from_person.inverse_transform_point(&point);
-        (-0.5 * self.squared_deviation(place)).exp()
+        self.four_sided().density(world_from_person, point)
     }
 
-    /// How far from the person the density falls to `level`, metres, in `direction` (radians
-    /// counter-clockwise from the heading). `None` where `level` is not in (0, 1).
+    /// See [`FourSided::distance_at`].
     pub fn distance_at(&self, direction: f64, level: f64) -> Option<f64> {
-        let deviations = deviations_at(level)?;
-        let (sin, cos) = direction.sin_cos();
-        let along = if cos >= 0.0 { self.front } else { self.rear };
-        Some(deviations / (cos / along).hypot(sin / self.side))
+        self.four_sided().distance_at(direction, level)
     }
 
-    /// The contour at `level`: half an ellipse ahead and half another behind, world frame,
-    /// counter-clockwise from the right-hand side, closed (the first point is not repeated).
-    ///
-    /// `points` is rounded up to a multiple of four, so that the extremes on the axes are among
-    /// them. Empty where `level` is not in (0, 1).
+    /// See [`FourSided::contour`].
     pub fn contour(
         &self,
         world_from_person: &Isometry2<f64>,
         level: f64,
         points: usize,
     ) -> Vec<Point2<f64>> {
-        let Some(deviations) = deviations_at(level) else {
-            return Vec::new();
-        };
-        let half = (points.max(4).div_ceil(4)) * 2;
-        (0..2 * half)
-            .map(|i| {
-                let (sin, cos) = (-FRAC_PI_2 + PI * i as f64 / half as f64).sin_cos();
-                let along = if i <= half { self.front } else { self.rear };
-                world_from_person
-                    * Point2::new(deviations * along * cos, deviations * self.side * sin)
-            })
-            .collect()
+        self.four_sided().contour(world_from_person, level, points)
     }
 
     /// The space of a person who walks with `forward_speed` along the heading, m/s: the front
@@ -124,16 +103,6 @@ impl Default for AsymmetricGaussian {
     fn default() -> Self {
         Self::HALL
     }
-}
-
-/// How many standard deviations from the person the density is `level`.
-fn deviations_at(level: f64) -> Option<f64> {
-    (level > 0.0 && level < 1.0).then(|| squared_deviation_at(level).sqrt())
-}
-
-/// The squared deviation at which the density is `level`.
-pub(super) fn squared_deviation_at(level: f64) -> f64 {
-    -2.0 * level.ln()
 }
 
 #[cfg(test)]

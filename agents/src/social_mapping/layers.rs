@@ -255,7 +255,7 @@ fn corners(world_from_own: &Isometry2<f64>, x: [f64; 2], y: [f64; 2]) -> [Point2
         .map(|(x, y)| world_from_own * Point2::new(x, y))
 }
 
-fn distance_to_segment(point: Point2<f64>, [a, b]: &Wall) -> f64 {
+pub(super) fn distance_to_segment(point: Point2<f64>, [a, b]: &Wall) -> f64 {
     let along = b - a;
     let squared = along.norm_squared();
     let share = if squared > 0.0 {

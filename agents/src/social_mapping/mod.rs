@@ -8,9 +8,15 @@
 //! The layers, in AP's order: walls and the footprints of objects, inflated by the robot's radius;
 //! the spaces of objects with R(t); people with their zones; the space between people who talk.
 
+pub mod adaptation;
+pub mod comfort;
 pub mod config;
+pub mod density;
+pub mod features;
+pub mod four_sided;
 pub mod gaussian;
 pub mod graph;
+pub mod groups;
 mod layers;
 pub mod map;
 pub mod object_space;
@@ -18,7 +24,9 @@ pub mod scene;
 mod visibility;
 pub mod zones;
 
+pub use comfort::{Comfort, ComfortScene};
 pub use config::{ConfigError, SocialConfig};
+pub use four_sided::FourSided;
 pub use gaussian::AsymmetricGaussian;
 pub use graph::{SocialMapping, Turn};
 pub use map::{ObjectUse, PersonSpaces, SocialMapper, Update};

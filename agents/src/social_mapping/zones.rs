@@ -1,7 +1,8 @@
 //! Hall's zones around people: contour levels of their densities (TD 4.1, READING.md items 5, 6, 7,
 //! 16). This file owns which zone a place is in; the map and the metrics ask the same function.
 
-use super::gaussian::{AsymmetricGaussian, squared_deviation_at};
+use super::four_sided::squared_deviation_at;
+use super::gaussian::AsymmetricGaussian;
 use crate::grid::{BLOCKED, FREE};
 use nalgebra::{Isometry2, Point2};
 use serde::{Deserialize, Serialize};

@@ -111,7 +111,8 @@ pub fn object_spaces(
     Ok(spaces.collect())
 }
 
-fn mapped(object: &Object) -> MappedObject {
+/// An object as social mapping has it.
+pub(crate) fn mapped(object: &Object) -> MappedObject {
     MappedObject {
         name: object.name.clone(),
         class: object.class.clone(),

@@ -208,12 +208,17 @@ pub(super) fn number(value: f64) -> String {
 /// The colour of R(t) at `share` of the way from its least to its most: yellow over orange to red
 /// (Brewer's `YlOrRd`, whose lightness falls all the way, so that it reads in grey, too).
 pub(super) fn heat(share: f64) -> String {
-    let last = HEAT.len() - 1;
+    mix(&HEAT, share)
+}
+
+/// The colour at `share` of the way through evenly spaced colours.
+pub(super) fn mix(colours: &[[u8; 3]; 5], share: f64) -> String {
+    let last = colours.len() - 1;
     let place = share.clamp(0.0, 1.0) * last as f64;
     let index = (place.floor() as usize).min(last - 1);
     let between = place - index as f64;
     let mix = |channel: usize| {
-        let [from, to] = [index, index + 1].map(|i| f64::from(HEAT[i][channel]));
+        let [from, to] = [index, index + 1].map(|i| f64::from(colours[i][channel]));
         (from + (to - from) * between).round() as u8
     };
     format!("#{:02x}{:02x}{:02x}", mix(0), mix(1), mix(2))

@@ -1,0 +1,127 @@
+//! Who stands together: groups from people's poses (papers TD and TG, READING.md items 5, 10, 19
+//! and 20). This module owns the methods, how well each does, a group as one entity, and its name
+//! over time. Groups are disjoint, each has at least two members, and they depend on the poses and
+//! their order alone.
+
+mod clustering;
+mod entity;
+mod facing;
+mod mesh;
+mod near;
+pub mod score;
+mod tracking;
+mod triangulation;
+mod union;
+
+pub use clustering::GaussianClustering;
+pub use entity::GroupEntity;
+pub use facing::Facing;
+pub use tracking::GroupTracker;
+pub use triangulation::Triangulation;
+
+use nalgebra::Isometry2;
+use serde::{Deserialize, Serialize};
+
+/// More people than this are not searched for groups: where so many share a few metres, the
+/// question has no answer in a turn.
+pub const MOST_PEOPLE: usize = 20_000;
+
+/// How groups are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Ours: pairs that are near and face each other, on the Delaunay mesh. See [`Facing`].
+    #[default]
+    Facing,
+    /// Paper TD's. See [`GaussianClustering`].
+    GaussianClustering,
+    /// Paper TG's. See [`Triangulation`].
+    TriangulationStrict,
+}
+
+impl Method {
+    /// All methods, the default first.
+    pub const ALL: [Self; 3] = [
+        Self::Facing,
+        Self::GaussianClustering,
+        Self::TriangulationStrict,
+    ];
+
+    /// Its name in configuration and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Facing => "facing",
+            Self::GaussianClustering => "gaussian_clustering",
+            Self::TriangulationStrict => "triangulation_strict",
+        }
+    }
+}
+
+/// How groups are found, with all figures.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Grouping {
+    /// Which method.
+    pub method: Method,
+    /// The figures of [`Method::Facing`].
+    pub facing: Facing,
+    /// The figures of [`Method::GaussianClustering`].
+    pub gaussian_clustering: GaussianClustering,
+    /// The figures of [`Method::TriangulationStrict`].
+    pub triangulation_strict: Triangulation,
+}
+
+/// Too many people to look for groups among.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("groups are looked for among at most {MOST_PEOPLE} people, and here are {count}")]
+pub struct TooManyPeople {
+    /// How many there are.
+    pub count: usize,
+}
+
+impl Grouping {
+    /// That method with its default figures.
+    pub fn of(method: Method) -> Self {
+        Self {
+            method,
+            ..Self::default()
+        }
+    }
+
+    /// Whether all figures are usable.
+    pub fn is_valid(&self) -> bool {
+        self.facing.is_valid()
+            && self.gaussian_clustering.is_valid()
+            && self.triangulation_strict.is_valid()
+    }
+
+    /// The groups among people at these poses (`world_from_person`), as indices in ascending order,
+    /// the groups in the order of their first members. Whose pose is not finite is in no group.
+    ///
+    /// # Errors
+    /// [`TooManyPeople`].
+    pub fn groups(&self, people: &[Isometry2<f64>]) -> Result<Vec<Vec<usize>>, TooManyPeople> {
+        let finite = |pose: &Isometry2<f64>| {
+            pose.translation.vector.iter().all(|x| x.is_finite())
+                && pose.rotation.angle().is_finite()
+        };
+        let sound: Vec<usize> = (0..people.len()).filter(|i| finite(&people[*i])).collect();
+        if sound.len() > MOST_PEOPLE {
+            let count = sound.len();
+            return Err(TooManyPeople { count });
+        }
+        let poses: Vec<Isometry2<f64>> = sound.iter().map(|i| people[*i]).collect();
+        let mut groups = match self.method {
+            Method::Facing => self.facing.groups(&poses),
+            Method::GaussianClustering => self.gaussian_clustering.groups(&poses),
+            Method::TriangulationStrict => self.triangulation_strict.groups(&poses),
+        };
+        for member in groups.iter_mut().flatten() {
+            *member = sound[*member];
+        }
+        Ok(groups)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,45 @@
+//! Who is around a place, without asking everybody: people sorted into square cells.
+
+use nalgebra::Point2;
+use std::collections::BTreeMap;
+
+/// People by the cell that they stand in.
+#[derive(Debug)]
+pub(super) struct Near<'a> {
+    places: &'a [Point2<f64>],
+    reach: f64,
+    cells: BTreeMap<[i64; 2], Vec<usize>>,
+}
+
+impl<'a> Near<'a> {
+    /// Sorts finite `places` into cells of the side `reach`, metres.
+    pub(super) fn new(places: &'a [Point2<f64>], reach: f64) -> Self {
+        let mut cells: BTreeMap<[i64; 2], Vec<usize>> = BTreeMap::new();
+        for (index, place) in places.iter().enumerate() {
+            cells.entry(cell(*place, reach)).or_default().push(index);
+        }
+        Self {
+            places,
+            reach,
+            cells,
+        }
+    }
+
+    /// Everybody within the reach of `point`, in an order that depends on the places alone.
+    pub(super) fn around(&self, point: Point2<f64>) -> impl Iterator<Item = usize> + '_ {
+        let [column, row] = cell(point, self.reach);
+        (row.saturating_sub(1)..=row.saturating_add(1))
+            .flat_map(move |row| {
+                (column.saturating_sub(1)..=column.saturating_add(1))
+                    .map(move |column| [column, row])
+            })
+            .filter_map(|key| self.cells.get(&key))
+            .flatten()
+            .copied()
+            .filter(move |index| (self.places[*index] - point).norm() <= self.reach)
+    }
+}
+
+fn cell(point: Point2<f64>, side: f64) -> [i64; 2] {
+    [point.x, point.y].map(|x| (x / side).floor() as i64)
+}

@@ -1,0 +1,88 @@
+//! Groups by each method: who is in one, who is not, and what does not change them.
+
+use super::*;
+use nalgebra::Vector2;
+use proptest::prelude::*;
+use std::f64::consts::{PI, TAU};
+
+/// People on a circle who all face its centre.
+pub(super) fn facing_centre(x: f64, y: f64, radius: f64, count: usize) -> Vec<Isometry2<f64>> {
+    (0..count)
+        .map(|i| {
+            let angle = TAU * i as f64 / count as f64;
+            let (sin, cos) = angle.sin_cos();
+            Isometry2::new(Vector2::new(x + radius * cos, y + radius * sin), angle + PI)
+        })
+        .collect()
+}
+
+fn groups(method: Method, people: &[Isometry2<f64>]) -> Vec<Vec<usize>> {
+    Grouping::of(method).groups(people).unwrap()
+}
+
+#[test]
+fn two_groups_and_a_passer_by_are_told_apart() {
+    let mut people = facing_centre(0.0, 0.0, 0.6, 3);
+    people.extend(facing_centre(3.0, 0.0, 0.5, 2));
+    people.push(Isometry2::new(Vector2::new(1.5, 1.5), 0.4));
+    assert_eq!(groups(Method::Facing, &people), [vec![0, 1, 2], vec![3, 4]]);
+    assert_eq!(
+        groups(Method::GaussianClustering, &people),
+        [vec![0, 1, 2], vec![3, 4]]
+    );
+    assert_eq!(groups(Method::TriangulationStrict, &people), [[0, 1, 2]]);
+}
+
+#[test]
+fn whose_pose_is_no_place_is_in_no_group() {
+    let mut people = facing_centre(0.0, 0.0, 0.5, 2);
+    people.insert(0, Isometry2::new(Vector2::new(f64::NAN, 0.0), 0.0));
+    people.insert(2, Isometry2::new(Vector2::new(0.0, 0.0), f64::INFINITY));
+    for method in [Method::Facing, Method::GaussianClustering] {
+        assert_eq!(groups(method, &people), [[1, 3]]);
+    }
+}
+
+#[test]
+fn more_people_than_can_be_searched_are_refused() {
+    let people = vec![Isometry2::identity(); MOST_PEOPLE + 1];
+    let error = Grouping::default().groups(&people).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "groups are looked for among at most 20000 people, and here are 20001"
+    );
+}
+
+#[test]
+fn every_method_has_its_name_in_configuration() {
+    for method in Method::ALL {
+        let written = serde_json::to_string(&method).unwrap();
+        assert_eq!(written, format!("\"{}\"", method.name()));
+    }
+    assert_eq!(Method::default(), Method::ALL[0]);
+}
+
+proptest! {
+    #[test]
+    fn groups_are_disjoint_and_move_with_their_people(
+        people in prop::collection::vec((-4.0..4.0f64, -4.0..4.0f64, -4.0..4.0f64), 0..24),
+        x in -50.0..50.0f64, y in -50.0..50.0f64, turn in -4.0..4.0f64,
+    ) {
+        let people: Vec<_> = people
+            .into_iter()
+            .map(|(x, y, heading)| Isometry2::new(Vector2::new(x, y), heading))
+            .collect();
+        let carried = Isometry2::new(Vector2::new(x, y), turn);
+        let moved: Vec<_> = people.iter().map(|pose| carried * pose).collect();
+        for method in Method::ALL {
+            let found = groups(method, &people);
+            let mut members: Vec<usize> = found.iter().flatten().copied().collect();
+            members.sort_unstable();
+            let count = members.len();
+            members.dedup();
+            prop_assert_eq!(count, members.len());
+            prop_assert!(found.iter().all(|group| group.len() > 1 && group.is_sorted()));
+            prop_assert_eq!(&found, &groups(method, &moved), "{}", method.name());
+        }
+    }
+}

@@ -1,0 +1,389 @@
+//! Pictures of one situation: people's density with contours, headings, groups and the spaces of
+//! objects; and the grid of costs. This file owns what is drawn over what; the text of a picture is a
+//! function of the situation, to the byte.
+
+mod key;
+
+use super::canvas::{self, INK, PEOPLE, View, heat, number, rectangle, text};
+use super::label::{Labels, Look};
+use super::legend;
+use crate::situation::{Mapped, Situation};
+use agents::grid::CostGrid;
+use agents::social_mapping::groups::GroupEntity;
+use agents::social_mapping::object_space::Outline;
+use agents::social_mapping::{FourSided, SocialConfig, Zone};
+use nalgebra::{Isometry2, Point2, Vector2};
+use svg::Document;
+use svg::node::element::{Group, Rectangle};
+
+/// Room for the map, px.
+const MAP: [f64; 2] = [820.0, 720.0];
+const TITLE: f64 = 46.0;
+const BORDER: f64 = 20.0;
+/// Width of the legend, px.
+const WIDTH: f64 = 216.0;
+/// Points of an outline.
+const OUTLINE: usize = 72;
+/// A tenth of density for each band.
+const BANDS: u32 = 9;
+/// Groups: Okabe and Ito's reddish purple.
+const GROUP: &str = "#aa3377";
+/// With more people than this, nobody is named.
+const NAMED: usize = 40;
+
+/// What a picture shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Show {
+    /// How much places belong to people.
+    Density,
+    /// What places cost the robot.
+    Costs,
+}
+
+/// Draws a situation as SVG 1.1; see [`super::png`] for pixels.
+pub fn social(situation: &Situation, mapped: &Mapped, config: &SocialConfig, show: Show) -> String {
+    let view = View::new(situation.scene.bounds, 0.0, [BORDER, TITLE + BORDER], MAP);
+    let [map_width, map_height] = view.size();
+    let left = BORDER + map_width + BORDER;
+    let (column, column_height) =
+        key::column([left, TITLE + BORDER], situation, mapped, config, show);
+    let width = number(left + WIDTH + BORDER);
+    let below = column_height.max(map_height + canvas::SCALE_BAR);
+    let height = number(TITLE + BORDER + below + BORDER);
+    let clip = svg::node::element::ClipPath::new()
+        .set("id", "map")
+        .add(view.frame());
+    let page = Rectangle::new()
+        .set("width", "100%")
+        .set("height", "100%")
+        .set("fill", "#ffffff");
+    let heading = text(BORDER, BORDER + 16.0, &situation.name, 20.0)
+        .set("font-weight", "bold")
+        .set("fill", INK);
+    let what = match show {
+        Show::Density => "people's density",
+        Show::Costs => "what a place costs the robot",
+    };
+    let line = format!("{what}, {}", situation.moment);
+    let subtitle = text(BORDER, BORDER + 36.0, &line, 13.0).set("fill", INK);
+    let document = Document::new()
+        .set("viewBox", format!("0 0 {width} {height}"))
+        .set("width", width)
+        .set("height", height)
+        .set("font-family", canvas::FONT)
+        .add(
+            svg::node::element::Definitions::new()
+                .add(clip)
+                .add(legend::gradient()),
+        )
+        .add(page)
+        .add(heading)
+        .add(subtitle)
+        .add(map(&view, situation, mapped, config, show))
+        .add(view.frame().set("fill", "none").set("stroke", "#999999"))
+        .add(view.scale_bar())
+        .add(column);
+    format!("{document}\n")
+}
+
+fn map(
+    view: &View,
+    situation: &Situation,
+    mapped: &Mapped,
+    config: &SocialConfig,
+    show: Show,
+) -> Group {
+    let mut labels = Labels::new(view);
+    let floor = if situation.rooms.is_empty() {
+        "#ffffff"
+    } else {
+        "#e9e9e9"
+    };
+    let mut group = Group::new()
+        .set("clip-path", "url(#map)")
+        .add(view.frame().set("fill", floor));
+    for room in &situation.rooms {
+        group = group.add(view.polygon(room.iter().copied()).set("fill", "#ffffff"));
+    }
+    group = match show {
+        Show::Costs => group.add(costs(view, &mapped.update.grid)),
+        Show::Density => group
+            .add(spaces(view, mapped, config))
+            .add(bands(view, mapped, config)),
+    };
+    group = group
+        .add(contours(view, mapped, config))
+        .add(groups(view, mapped, config))
+        .add(walls(view, situation))
+        .add(people(view, mapped, situation, &mut labels));
+    label_groups(view, mapped, &mut labels);
+    for one in &mapped.update.objects {
+        let look = Look {
+            size: 11.0,
+            colour: INK,
+            bold: false,
+        };
+        let words = format!("{} R = {:.2}", one.name, one.usage);
+        let centre = Point2::from(one.world_from_object.translation.vector);
+        labels.centred(view.page(centre), &words, look);
+    }
+    group.add(labels.draw())
+}
+
+/// Grid cells of one cost, each row's neighbours in one piece.
+fn costs(view: &View, grid: &CostGrid) -> Group {
+    let mut group = Group::new().set("shape-rendering", "crispEdges");
+    for row in 0..grid.height {
+        let costs = &grid.costs[row * grid.width..(row + 1) * grid.width];
+        let mut column = 0;
+        for run in costs.chunk_by(|a, b| a.to_bits() == b.to_bits()) {
+            let start = column;
+            column += run.len();
+            let Some(colour) = cost_colour(run[0]) else {
+                continue;
+            };
+            let corner = |column: usize, row: usize| {
+                let step = Vector2::new(column as f64, row as f64) * grid.resolution;
+                view.page(grid.origin + step)
+            };
+            let (low, high) = (corner(start, row), corner(column, row + 1));
+            let piece = rectangle(low.x, high.y, high.x - low.x, low.y - high.y);
+            group = group.add(piece.set("fill", colour));
+        }
+    }
+    group
+}
+
+/// The dearest cost that is not blocked (personal space).
+const DEAREST: f32 = 4.0;
+
+fn cost_colour(cost: f32) -> Option<String> {
+    if cost <= 1.0 {
+        None
+    } else if cost.is_finite() {
+        Some(heat(f64::from((cost - 1.0) / (DEAREST - 1.0))))
+    } else {
+        Some("#4d4d4d".to_owned())
+    }
+}
+
+fn spaces(view: &View, mapped: &Mapped, config: &SocialConfig) -> Group {
+    let objects = &mapped.update.objects;
+    objects.iter().fold(Group::new(), |group, one| {
+        let curve = config.usage_of.get(&one.name).unwrap_or(&config.usage);
+        let share = if curve.most > curve.least {
+            (one.usage - curve.least) / (curve.most - curve.least)
+        } else {
+            0.0
+        };
+        let colour = heat(share);
+        group.add(
+            view.polygon(one.space.iter().copied())
+                .set("fill", colour.as_str())
+                .set("fill-opacity", "0.45")
+                .set("stroke", colour.as_str())
+                .set("stroke-width", "1.2"),
+        )
+    })
+}
+
+/// Bands of density: everybody's outlines of one level lie under everybody's of the next, so that
+/// what shows is the greatest density of all.
+fn bands(view: &View, mapped: &Mapped, config: &SocialConfig) -> Group {
+    let shape = config.proxemics.shape;
+    (1..=BANDS).fold(Group::new(), |group, band| {
+        let level = f64::from(band) / f64::from(BANDS + 1);
+        let layer = Group::new()
+            .set("fill", density_colour(level))
+            .set("fill-opacity", if band == 1 { "0.75" } else { "0.85" });
+        group.add(mapped.update.people.iter().fold(layer, |layer, person| {
+            let outline = shape.contour(&person.world_from_person, level, OUTLINE);
+            layer.add(view.polygon(outline))
+        }))
+    })
+}
+
+/// Pale to dark blue (Brewer's `Blues`, whose lightness falls all the way).
+fn density_colour(level: f64) -> String {
+    const BLUES: [[u8; 3]; 5] = [
+        [0xef, 0xf5, 0xfc],
+        [0xc6, 0xdb, 0xef],
+        [0x9e, 0xca, 0xe1],
+        [0x4a, 0x98, 0xc9],
+        [0x08, 0x45, 0x94],
+    ];
+    canvas::mix(&BLUES, level)
+}
+
+/// The zones' edges, the closest drawn strongest.
+fn contours(view: &View, mapped: &Mapped, config: &SocialConfig) -> Group {
+    let edges = [
+        (Zone::Social, "0.8", "4 3"),
+        (Zone::Personal, "1.1", "none"),
+        (Zone::Intimate, "1.8", "none"),
+    ];
+    edges
+        .into_iter()
+        .fold(Group::new(), |group, (zone, width, dashes)| {
+            let layer = Group::new()
+                .set("fill", "none")
+                .set("stroke", "#0b2f5b")
+                .set("stroke-width", width)
+                .set("stroke-dasharray", dashes);
+            group.add(mapped.update.people.iter().fold(layer, |layer, person| {
+                let outline = config
+                    .proxemics
+                    .contour(zone, &person.world_from_person, OUTLINE);
+                layer.add(view.polygon(outline))
+            }))
+        })
+}
+
+/// Groups: their members joined to their middle, which way they face, and the space of the whole.
+fn groups(view: &View, mapped: &Mapped, config: &SocialConfig) -> Group {
+    let person = FourSided::from(config.proxemics.shape);
+    let level = config.proxemics.levels.personal;
+    let mut all = Group::new().set("stroke", GROUP).set("fill", "none");
+    for members in &mapped.groups {
+        let poses: Vec<Isometry2<f64>> = members
+            .iter()
+            .map(|member| mapped.update.people[*member].world_from_person)
+            .collect();
+        let Some(entity) = GroupEntity::new(&poses) else {
+            continue;
+        };
+        let centre = Point2::from(entity.world_from_group.translation.vector);
+        let mut group = Group::new();
+        let outline = entity
+            .widths(&person)
+            .contour(&entity.world_from_group, level, OUTLINE);
+        group = group.add(
+            view.polygon(outline)
+                .set("stroke-width", "1.4")
+                .set("stroke-dasharray", "7 4"),
+        );
+        for pose in &poses {
+            let spoke = view.line(centre, pose.translation.vector.into());
+            group = group.add(spoke.set("stroke-width", "2.2"));
+        }
+        let ahead = entity.world_from_group * Point2::new(0.45, 0.0);
+        group = group
+            .add(arrow(view, centre, ahead).set("fill", GROUP))
+            .add(
+                view.dot(centre, 4.5)
+                    .set("fill", "#ffffff")
+                    .set("stroke-width", "2"),
+            );
+        all = all.add(group);
+    }
+    all
+}
+
+/// The groups' numbers, after the names of people.
+fn label_groups(view: &View, mapped: &Mapped, labels: &mut Labels) {
+    for (index, members) in mapped.groups.iter().enumerate() {
+        let poses: Vec<Isometry2<f64>> = members
+            .iter()
+            .map(|member| mapped.update.people[*member].world_from_person)
+            .collect();
+        let Some(entity) = GroupEntity::new(&poses) else {
+            continue;
+        };
+        let centre = view.page(entity.world_from_group.translation.vector.into());
+        let look = Look {
+            size: 12.0,
+            colour: GROUP,
+            bold: true,
+        };
+        let words = format!("group {}", index + 1);
+        labels.keep_off(centre, 5.0);
+        if !labels.beside(centre, 6.0, &words, look) {
+            labels.beside(centre, view.px(0.9), &words, look);
+        }
+    }
+}
+
+fn walls(view: &View, situation: &Situation) -> Group {
+    let mut group = Group::new();
+    for object in &situation.scene.objects {
+        let pose = &object.world_from_object;
+        let body = Group::new()
+            .set("stroke", "#5a5a5a")
+            .set("stroke-width", "1.2")
+            .set("fill", "#c9c9c9");
+        group = group.add(match object.outline {
+            Outline::Circle(radius) => {
+                body.add(view.dot(pose.translation.vector.into(), view.px(radius)))
+            }
+            Outline::Rectangle(size) => {
+                let half = size / 2.0;
+                let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+                body.add(
+                    view.polygon(corners.map(|(x, y)| pose * Point2::new(x * half.x, y * half.y))),
+                )
+            }
+        });
+    }
+    for [from, to] in &situation.scene.walls {
+        let wall = view.line(*from, *to);
+        group = group.add(
+            wall.set("stroke", INK)
+                .set("stroke-width", "3")
+                .set("stroke-linecap", "round"),
+        );
+    }
+    group
+}
+
+/// Bodies with an arrow where they face.
+fn people(view: &View, mapped: &Mapped, situation: &Situation, labels: &mut Labels) -> Group {
+    let spaces = &mapped.update.people;
+    let mut group = Group::new();
+    for person in spaces {
+        let radius = situation
+            .scene
+            .people
+            .iter()
+            .find(|one| one.name == person.name)
+            .map_or(0.17, |one| one.radius.clamp(0.1, 0.17));
+        let pose = &person.world_from_person;
+        let centre = Point2::from(pose.translation.vector);
+        let ahead = pose * Point2::new(2.2 * radius, 0.0);
+        let body = view
+            .dot(centre, view.px(radius))
+            .set("fill", PEOPLE)
+            .set("stroke", INK)
+            .set("stroke-width", "1.2");
+        group = group.add(body).add(
+            arrow(view, centre, ahead)
+                .set("stroke", INK)
+                .set("fill", INK),
+        );
+        labels.keep_off(view.page(centre), view.px(radius));
+    }
+    if spaces.len() <= NAMED {
+        for person in spaces {
+            let look = Look {
+                size: 12.0,
+                colour: INK,
+                bold: false,
+            };
+            let centre = Point2::from(person.world_from_person.translation.vector);
+            labels.beside(view.page(centre), view.px(0.25), &person.name, look);
+        }
+    }
+    group
+}
+
+fn arrow(view: &View, from: Point2<f64>, to: Point2<f64>) -> Group {
+    let along = (to - from).try_normalize(1e-9).unwrap_or_default();
+    let across = Vector2::new(-along.y, along.x);
+    let head = 8.0 / view.px(1.0);
+    let neck = to - along * head;
+    Group::new()
+        .add(view.line(from, neck).set("stroke-width", "2"))
+        .add(
+            view.polygon([to, neck + across * head * 0.45, neck - across * head * 0.45])
+                .set("stroke", "none"),
+        )
+}

@@ -1,0 +1,84 @@
+//! The flags of `cortex social` and `cortex experiment`. Parsing a flag does nothing but parse it.
+
+use agents::social_mapping::groups::Method;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, Subcommand};
+use std::path::PathBuf;
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Social {
+    #[command(subcommand)]
+    pub(crate) action: SocialAction,
+}
+
+#[derive(Debug, Clone, Subcommand)]
+pub(crate) enum SocialAction {
+    /// Find who stands together, frame by frame, and score that where the truth is known
+    #[command(
+        after_help = "A group of the truth counts as found where at least 2/3 of its members (or \
+        all, at tolerance 1)\nare in one group found, of which at most the rest are wrong.\n\n\
+        Example:\n  cortex social groups recording.json --method triangulation_strict"
+    )]
+    Groups {
+        /// People frame by frame (JSON)
+        file: PathBuf,
+        /// How groups are found
+        #[arg(long, value_name = "M", default_value = Method::default().name(), value_parser = method())]
+        method: Method,
+        /// A line of JSON for each frame, and one with the scores
+        #[arg(long)]
+        json: bool,
+    },
+    /// Say how little the robot's place suits it, scene by scene: 0 nobody minds, 1 the worst
+    #[command(after_help = "Example:\n  cortex social comfort scenes.json --json")]
+    Comfort {
+        /// One scene a line (JSON), the robot at its origin
+        file: PathBuf,
+        /// A line of JSON for each scene
+        #[arg(long)]
+        json: bool,
+    },
+    /// Draw people's density with contours, headings, groups and the spaces of objects
+    #[command(
+        after_help = "Example:\n  cortex social density scenarios/care-centre --at 09:40 --out density.png"
+    )]
+    Density(SocialPicture),
+    /// Draw what places cost the robot, or write that as a ROS map (.yaml and .pgm)
+    #[command(
+        after_help = "Examples:\n  cortex social map scenarios/care-centre --out costs.png\n  \
+        cortex social map recording.json --at 12 --out costs.yaml"
+    )]
+    Map(SocialPicture),
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct SocialPicture {
+    /// A recording of people frame by frame (JSON), or a scenario's folder
+    pub(crate) file: PathBuf,
+    /// When: a recording's last frame until this time, or a time of the scenario's day, HH:MM
+    /// [default: the start]
+    #[arg(long, value_name = "TIME")]
+    pub(crate) at: Option<String>,
+    /// Where to; the ending decides what
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: PathBuf,
+    /// How groups are found
+    #[arg(long, value_name = "M", default_value = Method::default().name(), value_parser = method())]
+    pub(crate) method: Method,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Experiment {
+    /// `list`, or the name of an experiment
+    pub(crate) name: String,
+    /// For machines
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+fn method() -> impl TypedValueParser<Value = Method> {
+    PossibleValuesParser::new(Method::ALL.map(Method::name)).map(|name| {
+        let named = |method: &Method| method.name() == name;
+        Method::ALL.into_iter().find(named).unwrap_or_default()
+    })
+}

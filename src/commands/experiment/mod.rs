@@ -1,0 +1,127 @@
+//! `cortex experiment`: the papers' tables and figures, ours beside what is printed. This module owns
+//! the list of those there are, and guarantees that every one listed runs.
+
+mod flexible_density;
+mod social_groups;
+mod social_shapes;
+mod table;
+
+use super::output::{print, print_json};
+use crate::cli::Experiment as Arguments;
+use crate::{Answer, Failure};
+use serde_json::json;
+use std::fmt::Write as _;
+use table::Table;
+
+/// Something of the papers that can be done again.
+struct Experiment {
+    name: &'static str,
+    /// What it shows, in a line.
+    about: &'static str,
+    run: fn() -> Result<Table, Failure>,
+}
+
+/// Every experiment, in the order of the papers.
+const EXPERIMENTS: &[Experiment] = &[
+    Experiment {
+        name: "fd-table1",
+        about: "personal space and passage with a wall ahead of a person (FD Table I)",
+        run: flexible_density::table1,
+    },
+    Experiment {
+        name: "fd-table2",
+        about: "the same with a wall to the side (FD Table II)",
+        run: flexible_density::table2,
+    },
+    Experiment {
+        name: "fd-table3",
+        about: "the same with a wall behind (FD Table III)",
+        run: flexible_density::table3,
+    },
+    Experiment {
+        name: "fd-table4",
+        about: "three people in a corridor (FD Table IV)",
+        run: flexible_density::table4,
+    },
+    Experiment {
+        name: "fd-table5",
+        about: "three people in an apartment (FD Table V)",
+        run: flexible_density::table5,
+    },
+    Experiment {
+        name: "tg-shapes",
+        about: "shapes of personal space under socialization features (TG Figs 13 and 14)",
+        run: social_shapes::shapes,
+    },
+    Experiment {
+        name: "tg-groups",
+        about: "groups by triangulation, and a group's own space (TG Figs 11, 12 and 15)",
+        run: social_groups::groups,
+    },
+];
+
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
+    if arguments.name == "list" {
+        list(arguments.json)?;
+        return Ok(Answer::Yes);
+    }
+    let experiment = find(&arguments.name)?;
+    let table = (experiment.run)()?;
+    if arguments.json {
+        print_json(&table.json(experiment.name, experiment.about))?;
+    } else {
+        print(&table.text(experiment.name, experiment.about))?;
+    }
+    Ok(Answer::Yes)
+}
+
+fn find(name: &str) -> Result<&'static Experiment, Failure> {
+    let found = EXPERIMENTS.iter().find(|one| one.name == name);
+    found.ok_or_else(|| {
+        let near = EXPERIMENTS
+            .iter()
+            .map(|one| (strsim::jaro(one.name, name), one.name))
+            .max_by(|a, b| a.0.total_cmp(&b.0));
+        let help = match near {
+            Some((likeness, near)) if likeness > 0.7 => format!("did you mean `{near}`?"),
+            _ => "`cortex experiment list` names them all".to_owned(),
+        };
+        Failure::input_with_help(format!("there is no experiment `{name}`"), help)
+    })
+}
+
+fn list(json: bool) -> Result<(), Failure> {
+    if json {
+        let all = EXPERIMENTS
+            .iter()
+            .map(|one| json!({"name": one.name, "about": one.about}));
+        return print_json(&all.collect());
+    }
+    let mut text = String::new();
+    for one in EXPERIMENTS {
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "{:12} {}", one.name, one.about);
+    }
+    print(&text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_experiment_runs_and_explains_what_differs() {
+        for one in EXPERIMENTS {
+            let table = (one.run)().unwrap();
+            assert!(!table.rows.is_empty(), "{}", one.name);
+            for row in &table.rows {
+                assert!(
+                    row.agrees() || row.note.is_some(),
+                    "{}: {} differs and nothing says why",
+                    one.name,
+                    row.label
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! A table of figures, ours beside the printed ones. This file owns how it is written; whether two
+//! figures agree is said by the row, in the precision of the print.
+
+use serde_json::{Value, json};
+use std::fmt::Write as _;
+
+/// Figures in rows and columns, and what to know about them.
+pub(super) struct Table {
+    pub(super) columns: Vec<&'static str>,
+    pub(super) rows: Vec<Row>,
+    pub(super) notes: Vec<&'static str>,
+}
+
+/// A line of a table.
+pub(super) struct Row {
+    pub(super) label: String,
+    /// One for each column.
+    pub(super) cells: Vec<Cell>,
+    /// Why ours differ from the printed ones, where they do.
+    pub(super) note: Option<&'static str>,
+}
+
+/// Ours, and what is printed where something is.
+#[derive(Clone)]
+pub(super) struct Cell {
+    ours: Figure,
+    printed: Option<Figure>,
+    /// How far apart the two may lie.
+    tolerance: f64,
+}
+
+/// What stands in a cell.
+#[derive(Clone, PartialEq)]
+pub(super) enum Figure {
+    Number(f64),
+    Text(String),
+}
+
+impl Cell {
+    pub(super) fn number(ours: f64) -> Self {
+        Self {
+            ours: Figure::Number(ours),
+            printed: None,
+            tolerance: 0.0,
+        }
+    }
+
+    pub(super) fn numbers(ours: f64, printed: f64, tolerance: f64) -> Self {
+        Self {
+            ours: Figure::Number(ours),
+            printed: Some(Figure::Number(printed)),
+            tolerance,
+        }
+    }
+
+    pub(super) fn text(ours: impl Into<String>) -> Self {
+        Self {
+            ours: Figure::Text(ours.into()),
+            printed: None,
+            tolerance: 0.0,
+        }
+    }
+
+    pub(super) fn texts(ours: impl Into<String>, printed: impl Into<String>) -> Self {
+        Self {
+            ours: Figure::Text(ours.into()),
+            printed: Some(Figure::Text(printed.into())),
+            tolerance: 0.0,
+        }
+    }
+
+    fn agrees(&self) -> bool {
+        match (&self.ours, &self.printed) {
+            (_, None) => true,
+            (Figure::Number(ours), Some(Figure::Number(printed))) => {
+                (ours - printed).abs() <= self.tolerance
+            }
+            (ours, Some(printed)) => ours == printed,
+        }
+    }
+
+    fn text_form(&self) -> String {
+        match &self.printed {
+            None => self.ours.text_form(),
+            Some(printed) => {
+                let mark = if self.agrees() { "" } else { " !" };
+                format!("{} | {}{mark}", self.ours.text_form(), printed.text_form())
+            }
+        }
+    }
+
+    fn json_form(&self) -> Value {
+        match &self.printed {
+            None => self.ours.json_form(),
+            Some(printed) => json!({
+                "ours": self.ours.json_form(),
+                "printed": printed.json_form(),
+                "agrees": self.agrees(),
+            }),
+        }
+    }
+}
+
+impl Figure {
+    fn text_form(&self) -> String {
+        match self {
+            Self::Number(number) => format!("{number:.2}"),
+            Self::Text(text) => text.clone(),
+        }
+    }
+
+    fn json_form(&self) -> Value {
+        match self {
+            Self::Number(number) => json!(number),
+            Self::Text(text) => json!(text),
+        }
+    }
+}
+
+impl Row {
+    /// Whether all figures agree with the printed ones.
+    pub(super) fn agrees(&self) -> bool {
+        self.cells.iter().all(Cell::agrees)
+    }
+}
+
+impl Table {
+    /// For people: a cell with two figures has ours first and the printed one second.
+    pub(super) fn text(&self, name: &str, about: &str) -> String {
+        let header: Vec<String> = std::iter::once(String::new())
+            .chain(self.columns.iter().map(|column| (*column).to_owned()))
+            .collect();
+        let mut lines = vec![header];
+        for row in &self.rows {
+            let cells = row.cells.iter().map(Cell::text_form);
+            lines.push(std::iter::once(row.label.clone()).chain(cells).collect());
+        }
+        let widths: Vec<usize> = (0..=self.columns.len())
+            .map(|column| {
+                let cells = lines.iter().filter_map(|line| line.get(column));
+                cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
+            })
+            .collect();
+        let mut text = format!("{name}: {about}\nours | printed, ! where they differ\n\n");
+        for (index, line) in lines.iter().enumerate() {
+            let mut cells = line
+                .iter()
+                .zip(&widths)
+                .map(|(cell, width)| format!("{cell:width$}"));
+            let mut whole = cells.next().unwrap_or_default();
+            for cell in cells {
+                whole.push_str("  ");
+                whole.push_str(&cell);
+            }
+            // Writing to a string does not fail.
+            let _ = writeln!(text, "{}", whole.trim_end());
+            let note = index.checked_sub(1).and_then(|row| self.rows[row].note);
+            if let Some(note) = note {
+                let _ = writeln!(text, "{:width$}  ^ {note}", "", width = widths[0]);
+            }
+        }
+        for note in &self.notes {
+            let _ = write!(text, "\n{note}\n");
+        }
+        text
+    }
+
+    /// For machines.
+    pub(super) fn json(&self, name: &str, about: &str) -> Value {
+        let rows = self.rows.iter().map(|row| {
+            let cells = self.columns.iter().zip(&row.cells);
+            let values: serde_json::Map<String, Value> = cells
+                .map(|(column, cell)| ((*column).to_owned(), cell.json_form()))
+                .collect();
+            json!({
+                "label": row.label, "values": values, "agrees": row.agrees(), "note": row.note,
+            })
+        });
+        json!({
+            "name": name, "about": about, "columns": self.columns,
+            "rows": rows.collect::<Vec<_>>(), "notes": self.notes,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_shows_both_figures_and_why_they_differ() {
+        let table = Table {
+            columns: vec!["width", "passes"],
+            rows: vec![
+                Row {
+                    label: "near".into(),
+                    cells: vec![Cell::numbers(1.004, 1.05, 0.015), Cell::texts("yes", "yes")],
+                    note: Some("a slip"),
+                },
+                Row {
+                    label: "far away".into(),
+                    cells: vec![Cell::number(2.0), Cell::text("no")],
+                    note: None,
+                },
+            ],
+            notes: vec!["That is all."],
+        };
+        let expected = "\
+t: a test
+ours | printed, ! where they differ
+
+          width          passes
+near      1.00 | 1.05 !  yes | yes
+          ^ a slip
+far away  2.00           no
+
+That is all.
+";
+        assert_eq!(table.text("t", "a test"), expected);
+        let json = table.json("t", "a test");
+        assert_eq!(json["rows"][0]["values"]["width"]["agrees"], false);
+        assert_eq!(json["rows"][1]["values"]["passes"], "no");
+    }
+}

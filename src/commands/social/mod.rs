@@ -1,0 +1,24 @@
+//! `cortex social`: people and the space they need, from recordings and scenes.
+
+mod comfort;
+mod groups;
+mod picture;
+
+use crate::cli::{Social as Arguments, SocialAction};
+use crate::{Answer, Failure};
+use scenarios::picture::Show;
+use std::path::Path;
+
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
+    match &arguments.action {
+        SocialAction::Groups { file, method, json } => groups::run(file, *method, *json),
+        SocialAction::Comfort { file, json } => comfort::run(file, *json),
+        SocialAction::Density(arguments) => picture::run(arguments, Show::Density),
+        SocialAction::Map(arguments) => picture::run(arguments, Show::Costs),
+    }
+}
+
+/// What a reader of `file` said, as bad input.
+fn refused(file: &Path, problem: impl std::fmt::Display) -> Failure {
+    Failure::input(format!("{}: {problem}", file.display()))
+}

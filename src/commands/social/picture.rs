@@ -1,0 +1,200 @@
+//! `cortex social density` and `cortex social map`: one situation as a picture, or as a map for other
+//! programs.
+
+use super::refused;
+use crate::cli::SocialPicture as Arguments;
+use crate::commands::output::print;
+use crate::{Answer, Failure};
+use agents::grid::CostGrid;
+use agents::social_mapping::SocialConfig;
+use agents::social_mapping::groups::Grouping;
+use dsr::Time;
+use scenarios::Scenario;
+use scenarios::picture::{Show, png, social};
+use scenarios::scenes::parse_recording;
+use scenarios::situation::Situation;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Pixels of a PNG for each of the SVG's.
+const SCALE: f32 = 1.5;
+const DAY: f64 = 86_400.0;
+
+pub(super) fn run(arguments: &Arguments, show: Show) -> Result<Answer, Failure> {
+    let out = &arguments.out;
+    let kind = out.extension().and_then(|kind| kind.to_str()).unwrap_or("");
+    let known = match show {
+        Show::Density => &["png", "svg"][..],
+        Show::Costs => &["png", "svg", "yaml"],
+    };
+    if !known.contains(&kind) {
+        return Err(Failure::input_with_help(
+            format!("{} is not the name of a picture", out.display()),
+            format!("its ending decides what is written: .{}", known.join(", .")),
+        ));
+    }
+    let situation = situation(arguments)?;
+    let config = SocialConfig::default();
+    let mapped = situation
+        .map(&config, &Grouping::of(arguments.method))
+        .map_err(|error| refused(&arguments.file, error))?;
+    let svg = || social(&situation, &mapped, &config, show);
+    match kind {
+        "svg" => write(out, svg().as_bytes())?,
+        "png" => write(out, &png(&svg(), SCALE).map_err(Failure::internal)?)?,
+        _ => {
+            let image = out.with_extension("pgm");
+            write(&image, &pgm(&mapped.update.grid))?;
+            write(out, yaml(&mapped.update.grid, &image).as_bytes())?;
+        }
+    }
+    let mut text = format!(
+        "{}, {}: people {}, groups {} -> {}\n",
+        situation.name,
+        situation.moment,
+        mapped.update.people.len(),
+        mapped.groups.len(),
+        out.display()
+    );
+    for rejection in &mapped.update.rejected {
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "{rejection}");
+    }
+    print(&text)?;
+    Ok(Answer::Yes)
+}
+
+/// A recording's frame, or a scenario at a time.
+fn situation(arguments: &Arguments) -> Result<Situation, Failure> {
+    let file = &arguments.file;
+    let name = || {
+        let stem = file
+            .file_stem()
+            .map(|stem| stem.to_string_lossy().into_owned());
+        stem.unwrap_or_default()
+    };
+    if file.is_dir() {
+        let scenario: Scenario = crate::commands::load_scenario(file)?;
+        let now = match &arguments.at {
+            Some(at) => time_of_day(at, scenario.start)?,
+            None => scenario.start,
+        };
+        return Ok(Situation::of_scenario(&scenario, now));
+    }
+    let text = crate::commands::read_text(file)?;
+    let recording = parse_recording(&text).map_err(|error| refused(file, error))?;
+    let time = match &arguments.at {
+        None => f64::NEG_INFINITY,
+        Some(at) => at
+            .parse()
+            .ok()
+            .filter(|t: &f64| t.is_finite())
+            .ok_or_else(|| {
+                Failure::input(format!(
+                    "`{at}` is not a time of a recording: write a number"
+                ))
+            })?,
+    };
+    let frame = recording.at(time);
+    let frame = frame.ok_or_else(|| refused(file, "the recording has no frames"))?;
+    Ok(Situation::of_frame(&name(), frame))
+}
+
+/// `HH:MM` or `HH:MM:SS` of the scenario's day.
+fn time_of_day(text: &str, start: Time) -> Result<Time, Failure> {
+    let wrong = || {
+        Failure::input(format!(
+            "`{text}` is not a time of day: write HH:MM or HH:MM:SS"
+        ))
+    };
+    let parts: Option<Vec<u32>> = text.split(':').map(|part| part.parse().ok()).collect();
+    let (hours, minutes, seconds) = match parts.as_deref() {
+        Some([h, m]) => (*h, *m, 0),
+        Some([h, m, s]) => (*h, *m, *s),
+        _ => return Err(wrong()),
+    };
+    if hours > 23 || minutes > 59 || seconds > 59 {
+        return Err(wrong());
+    }
+    let midnight = (start.seconds() / DAY).floor() * DAY;
+    let of_day = f64::from(hours * 3600 + minutes * 60 + seconds);
+    Ok(Time::from_seconds(midnight + of_day))
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    std::fs::write(path, bytes)
+        .map_err(|error| Failure::input(format!("cannot write {}: {error}", path.display())))
+}
+
+/// The darkest grey of a place that may be entered; a ROS map of mode `scale` takes black for occupied and
+/// white for free.
+const DEAREST_GREY: f32 = 80.0;
+
+/// The grid as a portable grey map, the highest row first: white costs 1, black is blocked.
+fn pgm(grid: &CostGrid) -> Vec<u8> {
+    let dearest = grid
+        .costs
+        .iter()
+        .copied()
+        .filter(|cost| cost.is_finite())
+        .fold(1.0, f32::max);
+    let grey = |cost: f32| {
+        if !cost.is_finite() {
+            0
+        } else if dearest > 1.0 {
+            let share = (cost - 1.0) / (dearest - 1.0);
+            (254.0 - share * (254.0 - DEAREST_GREY)).round() as u8
+        } else {
+            254
+        }
+    };
+    let mut bytes = format!("P5\n{} {}\n255\n", grid.width, grid.height).into_bytes();
+    for row in (0..grid.height).rev() {
+        let costs = &grid.costs[row * grid.width..(row + 1) * grid.width];
+        bytes.extend(costs.iter().map(|cost| grey(*cost)));
+    }
+    bytes
+}
+
+/// What ROS's map server reads beside the image.
+fn yaml(grid: &CostGrid, image: &Path) -> String {
+    let image = image
+        .file_name()
+        .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    format!(
+        "image: {image}\nmode: scale\nresolution: {}\norigin: [{}, {}, 0]\nnegate: 0\n\
+         occupied_thresh: 0.9\nfree_thresh: 0.01\n",
+        grid.resolution, grid.origin.x, grid.origin.y
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ros_map_has_north_up_black_walls_and_white_floor() {
+        let mut grid = CostGrid::covering([0.0, 1.0, 0.3, 1.2], 0.1);
+        grid.costs[0] = f32::INFINITY;
+        grid.costs[1] = 4.0;
+        let bytes = pgm(&grid);
+        let (header, cells) = bytes.split_at(bytes.len() - 6);
+        assert_eq!(header, b"P5\n3 2\n255\n");
+        assert_eq!(cells, [254, 254, 254, 0, 80, 254]);
+        let text = yaml(&grid, Path::new("maps/floor.pgm"));
+        assert!(
+            text.starts_with("image: floor.pgm\nmode: scale\nresolution: 0.1\norigin: [0, 1, 0]")
+        );
+    }
+
+    #[test]
+    fn times_of_day_are_of_the_day_of_the_start() {
+        let start = Time::from_seconds(3.0 * DAY + 40_000.0);
+        let at = |text| time_of_day(text, start).map(|time| time.seconds() - 3.0 * DAY);
+        assert!((at("09:30").unwrap() - 34_200.0).abs() < 1e-6);
+        assert!((at("00:00:07").unwrap() - 7.0).abs() < 1e-6);
+        for wrong in ["9", "24:00", "10:60", "a:b", "1:2:3:4"] {
+            assert!(at(wrong).is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,228 @@
+//! `cortex social` and `cortex experiment` as their users meet them: groups and their scores,
+//! comfort, pictures, tables, and what is wrong with what they are given.
+
+use crate::support::Program;
+use serde_json::{Value, json};
+use std::f64::consts::PI;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+/// Exit code, standard output and standard error.
+fn cortex(arguments: &[&str]) -> (i32, String, String) {
+    let output = Program::run(arguments);
+    let words = |bytes| String::from_utf8(bytes).unwrap();
+    (
+        output.status.code().unwrap(),
+        words(output.stdout),
+        words(output.stderr),
+    )
+}
+
+fn lines(text: &str) -> Vec<Value> {
+    text.lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
+}
+
+fn person(id: u32, x: f64, y: f64, heading: f64) -> Value {
+    json!({"id": id, "x_m": x, "y_m": y, "theta_rad": heading})
+}
+
+/// Two who talk and one who passes; then one alone, who was said to be in a group.
+fn recording(folder: &TempDir, truth: bool) -> String {
+    let talk = [
+        person(4, 0.0, 0.0, 0.0),
+        person(2, 1.0, 0.0, PI),
+        person(7, 4.0, 3.0, 1.0),
+    ];
+    let mut frames = vec![
+        json!({"t": 1, "people": talk, "groups": [[2, 4]]}),
+        json!({"t": 2.5, "people": [person(4, 0.0, 0.0, 0.0)], "groups": [[2, 4]]}),
+    ];
+    if !truth {
+        for frame in &mut frames {
+            frame.as_object_mut().unwrap().remove("groups");
+        }
+    }
+    save(
+        folder,
+        "people.json",
+        &json!({"frames": frames}).to_string(),
+    )
+}
+
+fn save(folder: &TempDir, name: &str, text: &str) -> String {
+    let path = folder.path().join(name);
+    fs::write(&path, text).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+#[test]
+fn groups_are_found_frame_by_frame_and_scored_where_the_truth_is_known() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = recording(&folder, true);
+    let (code, out, _) = cortex(&["social", "groups", &file, "--json"]);
+    let found = lines(&out);
+    assert_eq!(code, 0);
+    assert_eq!(found.len(), 3);
+    assert_eq!(found[0], json!({"t": 1.0, "groups": [[2, 4]]}));
+    assert_eq!(found[1], json!({"t": 2.5, "groups": []}));
+    let scores = &found[2];
+    assert_eq!(scores["precision"], 1.0);
+    assert_eq!(scores["recall"], 0.5);
+    assert!((scores["f1_t2_3"].as_f64().unwrap() - 2.0 / 3.0).abs() < 1e-12);
+    assert_eq!(scores["f1_t2_3"], scores["f1_t1"]);
+
+    let strict = [
+        "social",
+        "groups",
+        &file,
+        "--method",
+        "triangulation_strict",
+    ];
+    let (code, out, _) = cortex(&strict);
+    assert_eq!(code, 0);
+    assert!(
+        out.contains("method triangulation_strict") && out.contains("recall 0.000"),
+        "{out}"
+    );
+
+    let (_, out, _) = cortex(&["social", "groups", &recording(&folder, false), "--json"]);
+    assert_eq!(lines(&out).len(), 2);
+}
+
+#[test]
+fn the_closer_the_people_the_dearer_the_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = |name: &str, x: f64| {
+        json!({
+            "identifier": name, "robot": {"id": 0}, "objects": [], "links": [],
+            "humans": [{"id": 1, "xPos": x, "yPos": 0, "orientation": -90}],
+            "room": [[-500, -500], [500, -500], [500, 500], [-500, 500]],
+        })
+        .to_string()
+    };
+    let text = [scene("near", 40.0), scene("far", 300.0), scene("on", 0.0)].join("\n");
+    let file = save(&folder, "scenes.json", &text);
+    let (code, out, _) = cortex(&["social", "comfort", &file, "--json"]);
+    assert_eq!(code, 0);
+    let costs: Vec<f64> = lines(&out)
+        .iter()
+        .map(|line| line["cost"].as_f64().unwrap())
+        .collect();
+    assert!(
+        costs[1] < 0.05 && costs[0] > 0.8 && costs[0] < 1.0,
+        "{costs:?}"
+    );
+    assert!((costs[2] - 1.0).abs() < 1e-9);
+    assert_eq!(lines(&out)[0]["identifier"], "near");
+
+    let flat = text.replacen("[500,500],[-500,500]", "[0,-500],[100,-500]", 1);
+    assert_ne!(flat, text);
+    let (code, _, err) = cortex(&["social", "comfort", &save(&folder, "flat.json", &flat)]);
+    assert_eq!(code, 2);
+    assert!(
+        err.contains("scene near: the room of 4 corners encloses nothing"),
+        "{err}"
+    );
+}
+
+#[test]
+fn a_situation_is_drawn_and_written_as_a_map() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = recording(&folder, false);
+    let out = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    for (verb, name, magic) in [
+        ("density", "density.svg", &b"<svg"[..]),
+        ("map", "costs.png", b"\x89PNG"),
+        ("map", "costs.yaml", b"image: costs.pgm"),
+    ] {
+        let (code, text, err) = cortex(&["social", verb, &file, "--at", "2", "--out", &out(name)]);
+        assert_eq!(code, 0, "{err}");
+        assert!(text.contains("t = 1: people 3, groups 1"), "{text}");
+        assert!(fs::read(out(name)).unwrap().starts_with(magic), "{name}");
+    }
+    let svg = fs::read_to_string(out("density.svg")).unwrap();
+    for words in [
+        "group 1",
+        "intimate, density 0.9",
+        "person, facing",
+        " m</text>",
+    ] {
+        assert!(
+            svg.contains(words) || svg.contains(&words.replace("</text>", "\n</text>")),
+            "{words}"
+        );
+    }
+    assert!(fs::read(out("costs.pgm")).unwrap().starts_with(b"P5\n"));
+
+    let scenario = [
+        "social",
+        "density",
+        "scenarios/care-centre",
+        "--at",
+        "10:45",
+    ];
+    let picture = out("centre.svg");
+    let (code, text, err) = cortex(&[&scenario[..], &["--out", &picture]].concat());
+    assert_eq!(code, 0, "{err}");
+    assert!(text.contains("people 10"), "{text}");
+    assert!(
+        fs::read_to_string(Path::new(&picture))
+            .unwrap()
+            .contains("day_tv R = 3.50")
+    );
+}
+
+#[test]
+fn what_cannot_be_used_is_refused_with_what_could() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = recording(&folder, true);
+    let broken = save(&folder, "broken.json", "{\"frames\": [\n{\"t\": 1,");
+    let people: Vec<Value> = (0..20_001).map(|id| person(id, 0.0, 0.0, 0.0)).collect();
+    let crowd = json!({"frames": [{"t": 0, "people": people}]}).to_string();
+    let crowd = save(&folder, "crowd.json", &crowd);
+    for (arguments, says) in [
+        (&["social", "groups", &broken][..], "line 2, column 8"),
+        (
+            &["social", "groups", &crowd],
+            "at most 20000 people, and here are 20001",
+        ),
+        (&["social", "groups", &file, "--method", "facng"], "facing"),
+        (
+            &["social", "density", &file, "--out", "density.gif"],
+            "its ending decides",
+        ),
+        (
+            &["social", "map", &file, "--at", "noon", "--out", "map.svg"],
+            "not a time",
+        ),
+        (&["experiment", "fd-tabel1"], "did you mean `fd-table1`?"),
+    ] {
+        let (code, _, err) = cortex(arguments);
+        assert_eq!(code, 2, "{arguments:?}: {err}");
+        assert!(err.contains(says), "{arguments:?}: {err}");
+    }
+}
+
+#[test]
+fn every_experiment_listed_runs() {
+    let (code, out, _) = cortex(&["experiment", "list", "--json"]);
+    assert_eq!(code, 0);
+    let list: Vec<Value> = serde_json::from_str(&out).unwrap();
+    let names: Vec<&str> = list
+        .iter()
+        .map(|one| one["name"].as_str().unwrap())
+        .collect();
+    for name in ["fd-table1", "fd-table5", "tg-shapes", "tg-groups"] {
+        assert!(names.contains(&name), "{name}");
+    }
+    let (code, out, _) = cortex(&["experiment", "fd-table1", "--json"]);
+    assert_eq!(code, 0);
+    let table: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(table["rows"].as_array().unwrap().len(), 9);
+    let (code, out, _) = cortex(&["experiment", "fd-table1"]);
+    assert_eq!(code, 0);
+    assert!(out.contains("READING.md 3"), "{out}");
+}
