@@ -124,8 +124,7 @@ fn rescue(session: &mut Session) -> Result<Vec<OsString>, String> {
     // A store that died before it showed its graph was not written to: what the one before it left
     // is still the newest.
     if session.epoch().is_ok() || !path.exists() {
-        let snapshot = session.snapshot().map_err(|error| error.to_string())?;
-        let image = Image::of(&snapshot).map_err(|error| error.to_string())?;
+        let image = session.read(Image::of).map_err(|error| error.to_string())?;
         std::fs::write(&path, image.to_bytes())
             .map_err(|error| format!("{}: {error}", path.display()))?;
     }
@@ -322,12 +321,7 @@ impl<'a> Conductor<'a> {
     }
 
     fn missions_are_over(&mut self, show: bool) -> Result<bool, ConductError> {
-        let snapshot = self.session.snapshot()?;
-        let missions = match missions_with_steps(&snapshot) {
-            // Overtaken while reading: the next look sees the next version.
-            Err(ReadError::SnapshotTooOld { .. }) => return Ok(false),
-            other => other?,
-        };
+        let missions = self.session.read(missions_with_steps)?;
         if show {
             let start = self.start;
             let now = self
@@ -372,8 +366,7 @@ impl<'a> Conductor<'a> {
 
     /// Takes the last of what there is to report, then ends the processes.
     fn finish(mut self) -> Result<Recording, ConductError> {
-        let snapshot = self.session.snapshot()?;
-        self.recording.missions = missions_with_steps(&snapshot)?;
+        self.recording.missions = self.session.read(missions_with_steps)?;
         let members = std::iter::once(self.store).chain(self.agents.clone());
         let members: Vec<usize> = members.chain(std::iter::once(self.world)).collect();
         self.supervisor.stop();

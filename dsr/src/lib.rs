@@ -15,6 +15,7 @@ mod ids;
 pub mod interchange;
 pub mod json;
 mod process;
+mod rights;
 mod schema;
 #[allow(
     unsafe_code,
@@ -30,15 +31,17 @@ pub mod wire;
 
 pub use arena::ReadError;
 pub use change::{Change, EdgeChange, Filter, NodeChange, RuleApplication, Touch};
-pub use graph::{Graph, Image, Limits, RuleEngine, decode_image};
+pub use graph::{Graph, Image, LeaseRefusal, Limits, RuleEngine, TransactionId, decode_image};
 pub use ids::{AttributeId, EdgeKey, Epoch, LabelId, NodeId, TypeId, Version, WriterId};
 pub use process::{Begin, Pace, TurnError, Turns, done_line, turn_line};
+pub use rights::{Manifest, ManifestError, Rights};
 pub use schema::{
     AttributeType, Label, NameKind, NodeType, Schema, SchemaError, SchemaFileError, suggest,
 };
 pub use shm::{
     AttachError, BareClient, BareServer, Changes, ClockError, CommitError, HotAttribute, HotError,
-    Instance, InstanceError, Publisher, Session, Store, StoreError, Subscriber, Tick, Update,
+    Instance, InstanceError, Lease, LeaseError, Publisher, Session, Store, StoreError, Subscriber,
+    Tick, Update,
 };
 pub use snapshot::{
     Attribute, Edge, Edges, Element, Neighbors, Node, NodeIds, Snapshot, TransformError,

@@ -13,7 +13,7 @@ pub use petgraph::{Edges, Neighbors};
 
 use crate::arena::record;
 use crate::arena::tree::{self, Key};
-use crate::arena::{Address, Arena, ReadError, Root, Word, trie};
+use crate::arena::{Address, Arena, LeaseMark, ReadError, Root, Word, trie};
 use crate::hot::Hot;
 use crate::shm::Segment;
 use crate::value::{hash, place};
@@ -68,6 +68,8 @@ pub struct Snapshot {
     index: OnceLock<Arc<[NodeId]>>,
     /// What owners give out beside the graph.
     hot: Option<Hot>,
+    /// By what it is read although it may be older than the history.
+    lease: Option<LeaseMark>,
 }
 
 /// Which values of an attribute to look for in its index.
@@ -98,6 +100,7 @@ impl Snapshot {
             schema,
             index: OnceLock::new(),
             hot: None,
+            lease: None,
         }
     }
 
@@ -139,6 +142,13 @@ impl Snapshot {
         self.clone().with_hot(None)
     }
 
+    /// The same version, read by a lease.
+    pub(crate) fn leased(&self, mark: LeaseMark) -> Self {
+        let mut leased = self.clone();
+        leased.lease = Some(mark);
+        leased
+    }
+
     /// The version that this is the state of.
     pub fn version(&self) -> Version {
         Version(self.root.version)
@@ -174,14 +184,11 @@ impl Snapshot {
     /// # Errors
     /// [`ReadError::SnapshotTooOld`].
     pub fn check(&self) -> Result<(), ReadError> {
-        self.arena.check(self.root.version)
+        self.arena.check(self.root.version, self.lease)
     }
 
     /// Turns the outcome of a walk through the arena into what the caller may see.
-    pub(in crate::snapshot) fn genuine<T>(
-        &self,
-        outcome: Result<T, Address>,
-    ) -> Result<T, ReadError> {
+    pub(crate) fn genuine<T>(&self, outcome: Result<T, Address>) -> Result<T, ReadError> {
         match outcome {
             Ok(found) => self.check().map(|()| found),
             Err(address) => Err(self.broken(address)),
@@ -189,7 +196,7 @@ impl Snapshot {
     }
 
     pub(in crate::snapshot) fn broken(&self, address: Address) -> ReadError {
-        self.arena.broken(self.root.version, address)
+        self.arena.broken(self.root.version, self.lease, address)
     }
 
     #[inline]
@@ -197,7 +204,7 @@ impl Snapshot {
         let words = self.arena.from(address);
         let record = words.and_then(|words| words.first_chunk::<{ record::NODE_HEADER }>());
         let (Some([id, kind, ..]), Some(words)) = (record, words) else {
-            return Err(self.arena.broken(self.root.version, address));
+            return Err(self.broken(address));
         };
         let (id, type_id) = (NodeId(id.load()), TypeId(kind.load() as u16));
         self.check()?;

@@ -103,7 +103,10 @@ fn store(
     let schema = Schema::from_toml("bench", schema).map_err(Failure::internal)?;
     let mut store = Store::open(instance, schema).map_err(Failure::internal)?;
     if let Some(history_bytes) = history {
-        store.graph_mut().set_limits(Limits { history_bytes });
+        store.graph_mut().set_limits(Limits {
+            history_bytes,
+            ..Limits::default()
+        });
     }
     if nodes > 0 {
         let committed = store.commit(&world(nodes), Time::default());

@@ -58,7 +58,7 @@ pub(crate) fn attach(name: &str) -> Result<Session, Failure> {
             "start one with `cortex run SCENARIO`, or look at a file with --file",
         ));
     }
-    Session::attach(&instance, "cortex-graph", PATIENCE).map_err(Failure::internal)
+    Session::attach(&instance, crate::manifests::TERMINAL, PATIENCE).map_err(Failure::internal)
 }
 
 /// Reads a graph file into a graph of this process.

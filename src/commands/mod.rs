@@ -53,7 +53,7 @@ fn load_scenario(folder: &Path) -> Result<Scenario, Failure> {
 }
 
 /// Reads a text file that the user named.
-fn read_text(path: &Path) -> Result<String, Failure> {
+pub(crate) fn read_text(path: &Path) -> Result<String, Failure> {
     std::fs::read_to_string(path)
         .map_err(|error| Failure::input(format!("cannot read {}: {error}", path.display())))
 }

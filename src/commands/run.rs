@@ -31,6 +31,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     // Everything that can be wrong with the input is told before a process is started.
     let scenario = super::load_scenario(&arguments.scenario)?;
     let (schema, grammar) = super::load_rules(&scenario)?;
+    crate::manifests::load(&scenario.folder, &schema)?;
     super::check_goals(&scenario, &grammar)?;
     if let Some(tracks) = &arguments.tracks {
         Tracks::load(tracks).map_err(|error| Failure::Input(error.into()))?;

@@ -32,10 +32,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
 fn serve(arguments: &Arguments, instance: &Instance, pace: Pace) -> Result<(), Failure> {
     let scenario = super::load_scenario(&arguments.scenario)?;
     let (schema, grammar) = super::load_rules(&scenario)?;
+    let manifests = crate::manifests::load(&scenario.folder, &schema)?;
     let interrupted = super::interruption()?;
     let state = arguments.state.as_deref().map(open_state).transpose()?;
     let mut store = Store::open(instance, schema).map_err(Failure::internal)?;
     store.graph_mut().set_rules(Arc::new(grammar));
+    store.graph_mut().set_rights(manifests);
     begin(&mut store, arguments, &scenario, state.as_ref())?;
     if let Some(state) = state {
         let durability = if arguments.durable {

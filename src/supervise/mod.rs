@@ -416,6 +416,7 @@ impl Hold {
         while !instance.remove_if_unused().into_diagnostic()? {
             if now() > deadline {
                 let processes = instance.processes().into_diagnostic()?;
+                drop(std::fs::remove_file(&path));
                 return Err(miette!(
                     help = "end them, or give this run another --instance",
                     "instance `{}` is in use by the processes {processes:?}",

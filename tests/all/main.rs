@@ -22,5 +22,6 @@ mod rules;
 mod run;
 mod social;
 mod state;
+mod store;
 mod support;
 mod tree;

@@ -31,10 +31,16 @@ fn main() -> Outcome {
     match role.as_str() {
         "hot-store" => hot_store(&instance),
         "hot-owner" => hot_owner(&instance),
-        "store" => store(&instance),
+        "store" => store(&instance, rest.first()),
         "join" => join(&instance),
         "store-with-state" => store_with_state(&instance, rest),
         "write-durable" => write_durable(&instance, number(0)?),
+        "append" => append(&instance, rest.first().map_or("a", String::as_str)),
+        "leases" => leases(&instance),
+        "follow" => follow(&instance),
+        "sum" => sum(&instance),
+        "fill" => fill(&instance),
+        "set" => set(&instance, rest),
         "write-pairs" => write_pairs(&instance),
         "read-pairs" => read_pairs(&instance),
         "memory" => memory(&instance, number(0)?),
@@ -56,17 +62,183 @@ fn end_of_input() -> Arc<AtomicBool> {
     ended
 }
 
-fn store(instance: &Instance) -> Outcome {
+/// Serves; from an image, if there is one.
+fn store(instance: &Instance, image: Option<&String>) -> Outcome {
     let mut store = Store::open(instance, Schema::open())?;
+    if let Some(path) = image {
+        store.restore(&dsr::decode_image(&std::fs::read(path)?)?)?;
+    }
     // Little history, so that memory of old versions is reused under slow readers.
     store.graph_mut().set_limits(dsr::Limits {
         history_bytes: 64 << 10,
+        ..dsr::Limits::default()
     });
     println!("ready");
     let ended = end_of_input();
+    let mut round = 0u32;
     while !ended.load(Ordering::Acquire) {
         store.serve(Duration::from_millis(20))?;
+        round = round.wrapping_add(1);
+        if round.is_multiple_of(40) {
+            store.clean_up_after_the_dead();
+        }
     }
+    Ok(())
+}
+
+/// Makes one node after the other, flat out, and tells how many.
+fn append(instance: &Instance, name: &str) -> Outcome {
+    let mut session = Session::attach(instance, name, PATIENCE)?;
+    let ended = end_of_input();
+    let mut made = 0;
+    while !ended.load(Ordering::Acquire) {
+        let mut transaction = Transaction::new();
+        transaction.create_node("thing", &format!("{name}{made}"), vec![]);
+        session.commit(&transaction, Time::default())?;
+        made += 1;
+    }
+    println!("{made}");
+    Ok(())
+}
+
+/// Takes all the leases there are.
+fn leases(instance: &Instance) -> Outcome {
+    let mut session = Session::attach(instance, "tenant", PATIENCE)?;
+    let snapshot = session.snapshot()?;
+    let mut leases = Vec::new();
+    for _ in 0..32 {
+        leases.push(session.lease(&snapshot, Duration::from_mins(5))?);
+    }
+    println!("ready");
+    let ended = end_of_input();
+    while !ended.load(Ordering::Acquire) {
+        session.wait_for_tick(Duration::from_millis(20))?;
+    }
+    Ok(())
+}
+
+/// Follows every commit.
+fn follow(instance: &Instance) -> Outcome {
+    let mut session = Session::attach(instance, "follower", PATIENCE)?;
+    let mut changes = session.changes(dsr::Filter::default())?;
+    println!("ready");
+    let ended = end_of_input();
+    while !ended.load(Ordering::Acquire) {
+        changes.wait(Duration::from_millis(20))?;
+        let schema = session.snapshot()?.schema().clone();
+        while changes.next(&schema)?.is_some() {}
+    }
+    Ok(())
+}
+
+/// Reads all nodes again and again, and tells at the end how many the last version has.
+fn sum(instance: &Instance) -> Outcome {
+    let mut session = Session::attach(instance, "reader", PATIENCE)?;
+    println!("ready");
+    let ended = end_of_input();
+    let sum = loop {
+        let last = ended.load(Ordering::Acquire);
+        let snapshot = session.snapshot()?;
+        match read_all(&snapshot, u64::MAX) {
+            Ok(found) if found != snapshot.node_count() => {
+                return Err(format!("{found} of {} nodes", snapshot.node_count()).into());
+            }
+            Ok(found) if last => break found,
+            Ok(_) | Err(ReadError::SnapshotTooOld { .. }) => {}
+            Err(other) => return Err(other.into()),
+        }
+    };
+    println!("{sum}");
+    Ok(())
+}
+
+/// Sets one attribute as an agent of that name, and stays.
+fn set(instance: &Instance, rest: &[String]) -> Outcome {
+    let [agent, attribute] = rest else {
+        return Err("usage: peer set INSTANCE AGENT ATTRIBUTE".into());
+    };
+    let mut session = Session::attach(instance, agent, PATIENCE)?;
+    let mut transaction = Transaction::new();
+    transaction.set("shelly", attribute, 1.0);
+    session.commit(&transaction, Time::default())?;
+    println!("done");
+    let ended = end_of_input();
+    while !ended.load(Ordering::Acquire) {
+        session.wait_for_tick(Duration::from_millis(20))?;
+    }
+    Ok(())
+}
+
+/// Fills the shared memory: by nodes, then with a file of somebody else's; both must be refusals.
+fn fill(instance: &Instance) -> Outcome {
+    let mut store = Store::open(instance, Schema::open())?;
+    let done = Arc::new(AtomicBool::new(false));
+    let asking = {
+        let (instance, done) = (instance.clone(), Arc::clone(&done));
+        std::thread::spawn(move || {
+            let outcome = fill_up(&instance).map_err(|error| error.to_string());
+            done.store(true, Ordering::Release);
+            outcome
+        })
+    };
+    while !done.load(Ordering::Acquire) {
+        store.serve(Duration::from_millis(5))?;
+    }
+    asking.join().map_err(|_| "the client panicked")??;
+    drop(store);
+    instance.remove()?;
+    Ok(())
+}
+
+/// A node of a megabyte.
+fn large(name: &str) -> Transaction {
+    let mut transaction = Transaction::new();
+    let bytes = Value::U8List(vec![1; 1 << 20]);
+    transaction.create_node("thing", name, vec![("bytes".into(), bytes)]);
+    transaction
+}
+
+fn fill_up(instance: &Instance) -> Outcome {
+    let mut session = Session::attach(instance, "filler", PATIENCE)?;
+    let mut count = 0;
+    loop {
+        match session.commit(&large(&format!("n{count}")), Time::default()) {
+            Ok(_) => count += 1,
+            Err(dsr::CommitError::Refused(dsr::Refusal::OutOfMemory { .. })) => break,
+            Err(other) => return Err(other.into()),
+        }
+        if count > 100 {
+            return Err("it never is full".into());
+        }
+    }
+    if count < 20 || session.snapshot()?.node_count() != count {
+        return Err(format!("full after {count}").into());
+    }
+    println!("full by the graph");
+    // Somebody else takes all that is left.
+    let other = "/dev/shm/somebody-else";
+    let mut file = std::fs::File::create(other)?;
+    while std::io::Write::write(&mut file, &[1; 4096]).is_ok_and(|n| n > 0) {}
+    for i in 0..200 {
+        let mut transaction = Transaction::new();
+        transaction.create_node("thing", &format!("m{i}"), vec![]);
+        transaction.set("n0", "x", f64::from(i));
+        match session.commit(&transaction, Time::default()) {
+            Ok(_) | Err(dsr::CommitError::Refused(dsr::Refusal::OutOfMemory { .. })) => {}
+            Err(other) => return Err(other.into()),
+        }
+        session.snapshot()?.node_count();
+    }
+    println!("full by others");
+    drop(file);
+    std::fs::remove_file(other)?;
+    let mut transaction = Transaction::new();
+    for i in 0..10 {
+        transaction.delete_node(format!("n{i}"));
+    }
+    session.commit(&transaction, Time::default())?;
+    session.commit(&large("again"), Time::default())?;
+    println!("room again");
     Ok(())
 }
 

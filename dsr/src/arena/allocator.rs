@@ -4,17 +4,31 @@
 
 use super::{Address, Arena, FIRST_BLOCK, Word};
 use crate::shm::Segment;
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::VecDeque;
+use std::time::Duration;
 
 /// A block that the next published version does not reach any more.
 #[derive(Debug)]
 struct Retired {
     /// The last version that reaches it.
     version: u64,
+    /// The first version that reaches it, or 0 where that is not known.
+    created: u64,
     address: Address,
     words: usize,
 }
+
+impl Retired {
+    /// Whether one of the versions reaches it.
+    fn is_in(&self, versions: &[u64]) -> bool {
+        let mut versions = versions.iter();
+        versions.any(|version| (self.created..=self.version).contains(version))
+    }
+}
+
+/// Versions are as old as the end of the span of so long that they were superseded in.
+const SPAN: Duration = Duration::from_millis(100);
 
 /// There is no room for another block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,6 +82,17 @@ pub(crate) struct Allocator {
     /// Blocks retired since the last version, taken back if the commit fails.
     pending: Vec<(Address, usize)>,
     in_use: usize,
+    /// Versions that leases keep.
+    leased: Vec<u64>,
+    /// While there are leases: the versions that blocks came with which are younger than the
+    /// first of those leases.
+    young: FxHashMap<Address, u64>,
+    /// Blocks that only leased versions reach.
+    held: Vec<Retired>,
+    held_words: usize,
+    /// The time, and when versions were superseded: the last of each span, and the span's end.
+    now: Duration,
+    ages: VecDeque<(u64, Duration)>,
 }
 
 impl Allocator {
@@ -84,6 +109,12 @@ impl Allocator {
             given: Vec::new(),
             pending: Vec::new(),
             in_use: 0,
+            leased: Vec::new(),
+            young: FxHashMap::default(),
+            held: Vec::new(),
+            held_words: 0,
+            now: Duration::ZERO,
+            ages: VecDeque::new(),
         }
     }
 
@@ -157,19 +188,36 @@ impl Allocator {
         self.in_use -= size;
     }
 
-    /// The commit that followed version `version` succeeded: what it retired stays readable in
-    /// versions up to that one.
-    pub(crate) fn committed(&mut self, version: u64) {
+    /// The commit that made version `new` after `old` succeeded: what it retired stays readable
+    /// in versions up to `old`.
+    pub(crate) fn committed(&mut self, old: u64, new: u64) {
+        if !self.leased.is_empty() {
+            for (address, _) in &self.given {
+                if self.fresh.contains(address) {
+                    self.young.insert(*address, new);
+                }
+            }
+        }
         self.fresh.clear();
         self.given.clear();
         for (address, words) in self.pending.drain(..) {
             self.retired_words += size_class(words).1;
             self.retired.push_back(Retired {
-                version,
+                version: old,
+                created: self.young.remove(&address).unwrap_or(0),
                 address,
                 words,
             });
         }
+        match self.ages.back_mut() {
+            Some((last, end)) if *end > self.now => *last = old,
+            _ => self.ages.push_back((old, self.now + SPAN)),
+        }
+    }
+
+    /// Tells the time, by a clock that does not run back.
+    pub(crate) fn set_clock(&mut self, now: Duration) {
+        self.now = self.now.max(now);
     }
 
     /// The commit failed: its blocks are free again, and what it retired is not.
@@ -184,33 +232,78 @@ impl Allocator {
         }
     }
 
-    /// Frees blocks of old versions until at most `keep_bytes` of them are left.
-    pub(crate) fn reclaim(&mut self, arena: &Arena, keep_bytes: usize) {
-        let mut count: usize = 0;
+    /// Gives up old versions until what only they reach takes at most `keep_bytes`, and those
+    /// that were superseded longer than `keep_age` ago.
+    pub(crate) fn reclaim(&mut self, arena: &Arena, keep_bytes: usize, keep_age: Duration) {
+        let mut last = None;
         let mut words = self.retired_words;
         for block in &self.retired {
             if words * 8 <= keep_bytes {
                 break;
             }
             words -= size_class(block.words).1;
-            count += 1;
+            last = Some(block.version);
+        }
+        while let Some(&(version, end)) = self.ages.front()
+            && end.saturating_add(keep_age) <= self.now
+        {
+            last = last.max(Some(version));
+            self.ages.pop_front();
         }
         // A version is given up as a whole.
-        let Some(last) = count.checked_sub(1).and_then(|i| self.retired.get(i)) else {
+        let Some(last) = last.filter(|&last| last >= arena.oldest()) else {
             return;
         };
-        let last = last.version;
         arena.forget_before(last + 1);
-        while self
-            .retired
-            .front()
-            .is_some_and(|block| block.version <= last)
-        {
-            if let Some(block) = self.retired.pop_front() {
-                self.retired_words -= size_class(block.words).1;
+        while let Some(block) = self.retired.pop_front() {
+            if block.version > last {
+                self.retired.push_front(block);
+                break;
+            }
+            let words = size_class(block.words).1;
+            self.retired_words -= words;
+            if block.is_in(&self.leased) {
+                self.held_words += words;
+                self.held.push(block);
+            } else {
                 self.release(block.address, block.words);
             }
         }
+        while self
+            .ages
+            .front()
+            .is_some_and(|&(version, _)| version <= last)
+        {
+            self.ages.pop_front();
+        }
+    }
+
+    /// Keeps what version `version` reaches, until [`Self::end_lease`].
+    pub(crate) fn lease(&mut self, version: u64) {
+        self.leased.push(version);
+    }
+
+    /// Ends a lease of that version; whoever reads by it must have been told before.
+    pub(crate) fn end_lease(&mut self, version: u64) {
+        if let Some(at) = self.leased.iter().position(|&leased| leased == version) {
+            self.leased.swap_remove(at);
+        }
+        if self.leased.is_empty() {
+            self.young = FxHashMap::default();
+        }
+        for block in std::mem::take(&mut self.held) {
+            if block.is_in(&self.leased) {
+                self.held.push(block);
+            } else {
+                self.held_words -= size_class(block.words).1;
+                self.release(block.address, block.words);
+            }
+        }
+    }
+
+    /// Bytes that are kept for leases alone.
+    pub(crate) fn held_bytes(&self) -> usize {
+        self.held_words * 8
     }
 }
 
@@ -255,16 +348,16 @@ mod tests {
         growth.grow(&arena, 0).unwrap();
         let mut allocator = Allocator::new(Box::new(HeapGrowth));
         let block = allocator.allocate(&arena, 10).unwrap();
-        allocator.committed(0);
+        allocator.committed(0, 1);
         allocator.retire(block, 10);
-        allocator.committed(1);
+        allocator.committed(1, 2);
         assert_ne!(
             allocator.allocate(&arena, 10).unwrap(),
             block,
             "version 1 can still be read"
         );
         assert_eq!(arena.oldest(), 0);
-        allocator.reclaim(&arena, 0);
+        allocator.reclaim(&arena, 0, Duration::MAX);
         assert_eq!(arena.oldest(), 2);
         assert_eq!(allocator.allocate(&arena, 10).unwrap(), block);
     }

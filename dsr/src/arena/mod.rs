@@ -76,15 +76,26 @@ mod at {
     pub(super) const SEGMENTS: usize = 5;
     pub(super) const BELL: usize = 6;
     pub(super) const ASLEEP: usize = 7;
+    pub(super) const LEASES: usize = 16;
     pub(super) const ROOTS: usize = 64;
 }
 
+/// How many leases there may be at once.
+pub(crate) const LEASES: usize = 32;
 /// How many versions back a root can be looked up.
 const ROOT_RING: u64 = 4096;
 /// Words of a root.
-pub(crate) const ROOT_WORDS: usize = 16;
+pub(crate) const ROOT_WORDS: usize = 18;
 /// First word that blocks are given out from.
 pub(crate) const FIRST_BLOCK: Address = at::ROOTS as u64 + ROOT_RING * ROOT_WORDS as u64;
+
+/// How a reader knows that its lease holds: its place has its token.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct LeaseMark {
+    pub(crate) place: usize,
+    /// Not 0, and never given twice.
+    pub(crate) token: u64,
+}
 
 /// One version of the graph: where its structures begin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -115,6 +126,10 @@ pub(crate) struct Root {
     pub(crate) agent: u64,
     /// Blob: the rules that were applied; 0 for none.
     pub(crate) rules: Address,
+    /// Tree from (client, 0) to the client's last transaction.
+    pub(crate) answers: Address,
+    /// The epoch of the first store of this graph.
+    pub(crate) lineage: u64,
 }
 
 impl Root {
@@ -136,6 +151,8 @@ impl Root {
             values,
             agent,
             rules,
+            answers,
+            lineage,
         } = self;
         let time = time.cast_unsigned();
         [
@@ -155,6 +172,8 @@ impl Root {
             values,
             agent,
             rules,
+            answers,
+            lineage,
         ]
     }
 
@@ -176,6 +195,8 @@ impl Root {
             values,
             agent,
             rules,
+            answers,
+            lineage,
         ] = words;
         let time = time.cast_signed();
         Self {
@@ -195,6 +216,8 @@ impl Root {
             values,
             agent,
             rules,
+            answers,
+            lineage,
         }
     }
 
@@ -378,7 +401,7 @@ impl Arena {
                 oldest: Version(oldest),
             });
         }
-        self.check(version).map(|()| root)
+        self.check(version, None).map(|()| root)
     }
 
     /// The oldest version up to `newest` whose root is kept.
@@ -415,12 +438,30 @@ impl Arena {
         fence(Ordering::Release);
     }
 
-    /// Whether all that was read of `version` up to now was genuine.
+    /// Says in a place for leases which lease it is for, or, with 0, that there is none any more:
+    /// before the memory that it kept is written over.
+    pub(crate) fn set_lease(&self, place: usize, token: u64) {
+        if place < LEASES
+            && let Some(word) = self.header(at::LEASES + place)
+        {
+            word.store(token);
+        }
+        fence(Ordering::Release);
+    }
+
+    #[cold]
+    fn lease_holds(&self, mark: LeaseMark) -> bool {
+        let word = self.header(at::LEASES + mark.place);
+        mark.place < LEASES && word.is_some_and(|word| word.load() == mark.token)
+    }
+
+    /// Whether all that was read of `version` up to now was genuine, where the reader may have a
+    /// lease of it.
     #[inline]
-    pub(crate) fn check(&self, version: u64) -> Result<(), ReadError> {
+    pub(crate) fn check(&self, version: u64, lease: Option<LeaseMark>) -> Result<(), ReadError> {
         fence(Ordering::Acquire);
         let oldest = self.oldest();
-        if version < oldest {
+        if version < oldest && !lease.is_some_and(|mark| self.lease_holds(mark)) {
             return Err(ReadError::SnapshotTooOld {
                 version: Version(version),
                 oldest: Version(oldest),
@@ -431,8 +472,13 @@ impl Arena {
 
     /// The error of a read that met something impossible at `address`: either the memory was
     /// reused under the reader, or it is damaged.
-    pub(crate) fn broken(&self, version: u64, address: Address) -> ReadError {
-        self.check(version)
+    pub(crate) fn broken(
+        &self,
+        version: u64,
+        lease: Option<LeaseMark>,
+        address: Address,
+    ) -> ReadError {
+        self.check(version, lease)
             .err()
             .unwrap_or(ReadError::Damaged { address })
     }

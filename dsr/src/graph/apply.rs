@@ -6,18 +6,22 @@ mod attributes;
 mod edges;
 mod nodes;
 
-use super::Graph;
 use super::image::{AttributeImage, Image};
+use super::{Answered, Graph, TransactionId};
 use crate::arena::allocator::Full;
 use crate::arena::record;
 use crate::arena::{Address, Root};
+use crate::rights::AgentRights;
 use crate::{
-    AttributeId, AttributeType, Change, EdgeChange, EdgeKey, EdgeRef, LabelId, NodeChange, NodeId,
-    NodeRef, Operation, Owner, Precondition, ReadError, Refusal, RuleApplication, Schema,
+    AttributeId, AttributeType, Change, Commit, EdgeChange, EdgeKey, EdgeRef, LabelId, NodeChange,
+    NodeId, NodeRef, Operation, Owner, Precondition, ReadError, Refusal, RuleApplication, Schema,
     SchemaError, Snapshot, Time, Touch, TypeId, Value, Version,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;
+
+/// The name that the store itself commits under, which no agent may use.
+pub(crate) const STORE: &str = "store";
 
 impl From<SchemaError> for Refusal {
     fn from(error: SchemaError) -> Self {
@@ -39,9 +43,15 @@ struct Stamp {
     writer: u16,
 }
 
+/// The root that a commit made, the nodes that it created, what it changed, and the client whose
+/// last transaction was forgotten for it.
+pub(super) type Applied = (Root, Vec<NodeId>, Change, Option<u64>);
+
 pub(super) struct Work<'a> {
-    graph: &'a mut Graph,
-    root: Root,
+    pub(super) graph: &'a mut Graph,
+    pub(super) root: Root,
+    /// The client whose last transaction this commit forgets.
+    pub(super) forgotten: Option<u64>,
     agent: String,
     stamp: Stamp,
     schema_changed: bool,
@@ -49,6 +59,10 @@ pub(super) struct Work<'a> {
     edges: Touched<EdgeKey, ()>,
     created: Vec<NodeId>,
     rules: Vec<RuleApplication>,
+    /// What the agent may do; `None` where it may do everything.
+    rights: Option<Arc<AgentRights>>,
+    /// The operations are a rule's, which the agent may apply whatever it does.
+    by_rule: bool,
 }
 
 fn touch<K: Ord, V>(
@@ -84,6 +98,10 @@ fn touch<K: Ord, V>(
 
 impl<'a> Work<'a> {
     pub(super) fn new(graph: &'a mut Graph, agent: &str, time: Time) -> Result<Self, Refusal> {
+        let rights = match &graph.rights {
+            Some(rights) if agent != STORE => Some(rights.of(agent)?),
+            _ => None,
+        };
         let mut root = graph.root;
         root.version += 1;
         root.time = time.nanoseconds();
@@ -100,6 +118,7 @@ impl<'a> Work<'a> {
         Ok(Self {
             graph,
             root,
+            forgotten: None,
             agent: agent.to_owned(),
             stamp: Stamp {
                 record: root.version,
@@ -112,13 +131,15 @@ impl<'a> Work<'a> {
             edges: BTreeMap::new(),
             created: Vec::new(),
             rules: Vec::new(),
+            rights,
+            by_rule: false,
         })
     }
 
     /// The root of a graph that is what the image says.
     pub(super) fn restore(graph: &'a mut Graph, image: &Image) -> Result<Root, Refusal> {
         let (frame, names) = (&image.frame, &image.schema);
-        let mut work = Self::new(graph, "store", frame.time)?;
+        let mut work = Self::new(graph, STORE, frame.time)?;
         for node in &image.nodes {
             let type_name = names.type_name(node.type_id);
             work.stamp.record = node.version;
@@ -140,6 +161,10 @@ impl<'a> Work<'a> {
         let writers = frame.writers.clone();
         let writers = work.graph.write_writers(writers, &mut work.root);
         work.room(writers)?;
+        for answered in &frame.answered {
+            work.remember(answered)?;
+        }
+        work.root.lineage = frame.lineage;
         work.root.version = frame.version.0;
         work.root.time = frame.time.nanoseconds();
         // The image does not say who made its version.
@@ -175,8 +200,19 @@ impl<'a> Work<'a> {
         &self.graph.schema
     }
 
-    fn room<T>(&self, outcome: Result<T, Full>) -> Result<T, Refusal> {
+    pub(super) fn room<T>(&self, outcome: Result<T, Full>) -> Result<T, Refusal> {
         outcome.map_err(|Full| self.graph.full())
+    }
+
+    /// Asks the agent's rights, where it acts by itself.
+    pub(super) fn may(
+        &self,
+        ask: impl FnOnce(&AgentRights, &Schema) -> Result<(), Refusal>,
+    ) -> Result<(), Refusal> {
+        match &self.rights {
+            Some(rights) if !self.by_rule => ask(rights, self.schema()),
+            _ => Ok(()),
+        }
     }
 
     pub(super) fn require(&self, preconditions: &[Precondition]) -> Result<(), Refusal> {
@@ -245,6 +281,7 @@ impl<'a> Work<'a> {
             Operation::CreateEdge { edge, attributes } => self.create_edge(edge, attributes),
             Operation::DeleteEdge { edge } => {
                 let (key, _, _) = self.edge(edge)?;
+                self.may(|rights, schema| rights.edge(schema, key.label))?;
                 self.delete_edge(key)
             }
             Operation::SetAttribute { owner, name, value } => {
@@ -265,6 +302,7 @@ impl<'a> Work<'a> {
             .rules
             .clone()
             .ok_or_else(|| refused("the graph has no grammar"))?;
+        self.may(|rights, _| rights.rule(rule, rules.actor(rule)))?;
         let binding = binding
             .iter()
             .map(|(variable, node)| Ok((variable.clone(), self.node(node)?.1.id)))
@@ -281,7 +319,29 @@ impl<'a> Work<'a> {
             rule: rule.to_owned(),
             binding,
         });
-        self.apply(&operations)
+        self.by_rule = true;
+        let applied = self.apply(&operations);
+        self.by_rule = false;
+        applied
+    }
+
+    /// Whether the edges of nodes that were given another type still join what they may.
+    fn check_retyped(&self) -> Result<(), Refusal> {
+        let retyped = self.nodes.iter();
+        let retyped = retyped.filter(|(_, (_, how, _))| *how == Touch::Replaced);
+        let snapshot = self.snapshot();
+        for (id, _) in retyped {
+            let Some(node) = snapshot.find_node(*id).map_err(damaged)? else {
+                continue;
+            };
+            for key in node.out_edges().chain(node.in_edges()) {
+                let key = key.map_err(damaged)?;
+                let kind = |id: NodeId| self.node(&id.into()).map(|(_, node)| TypeId(node.type_id));
+                let (from, to) = (kind(key.from)?, kind(key.to)?);
+                self.schema().check_ends(key.label, from, to)?;
+            }
+        }
+        Ok(())
     }
 
     fn open_schema(&mut self) -> Option<&mut Schema> {
@@ -335,7 +395,8 @@ impl<'a> Work<'a> {
         }
     }
 
-    pub(super) fn finish(mut self) -> Result<(Root, Vec<NodeId>, Change), Refusal> {
+    pub(super) fn finish(mut self, id: Option<TransactionId>) -> Result<Applied, Refusal> {
+        self.check_retyped()?;
         if self.schema_changed {
             let written = self.graph.write_schema(&mut self.root);
             self.room(written)?;
@@ -345,6 +406,15 @@ impl<'a> Work<'a> {
             let bytes = postcard::to_stdvec(&self.rules).unwrap_or_default();
             let written = record::write_blob(&mut self.graph.writer, &bytes);
             self.root.rules = self.room(written)?;
+        }
+        if let Some(id) = id {
+            let commit = Commit {
+                version: Version(self.root.version),
+                time: self.root.time(),
+                created: self.created.clone(),
+                durable: false,
+            };
+            self.remember(&Answered { id, commit })?;
         }
         let change = Change {
             epoch: self.graph.epoch,
@@ -372,12 +442,12 @@ impl<'a> Work<'a> {
                 })
                 .collect(),
         };
-        Ok((self.root, self.created, change))
+        Ok((self.root, self.created, change, self.forgotten))
     }
 }
 
 /// The writer reads its own memory: an impossible place there is a damaged arena.
-fn read<T>(outcome: Result<T, Address>) -> Result<T, Refusal> {
+pub(super) fn read<T>(outcome: Result<T, Address>) -> Result<T, Refusal> {
     outcome.map_err(|address| damaged(ReadError::Damaged { address }))
 }
 

@@ -2,7 +2,7 @@
 //! guarantees that a restored graph equals the one the image was taken of, down to who wrote each
 //! attribute when.
 
-use super::{Graph, apply};
+use super::{Answered, Graph, apply};
 use crate::{
     Attribute, AttributeId, Edge, EdgeKey, Node, NodeId, ReadError, Refusal, Schema, Snapshot,
     Time, TypeId, Value, Version,
@@ -79,6 +79,8 @@ pub(crate) struct Frame {
     pub(crate) version: Version,
     pub(crate) time: Time,
     pub(crate) next_id: u64,
+    pub(crate) answered: Vec<Answered>,
+    pub(crate) lineage: u64,
 }
 
 impl Frame {
@@ -88,6 +90,8 @@ impl Frame {
             version: snapshot.version(),
             time: snapshot.time(),
             next_id: snapshot.root.next_id,
+            answered: snapshot.all_answered()?,
+            lineage: snapshot.root.lineage,
         })
     }
 }
@@ -177,6 +181,8 @@ impl Graph {
         match root {
             Ok(root) => {
                 self.publish(root);
+                let clients = image.frame.answered.iter();
+                self.clients = clients.map(|a| (a.id.client, a.commit.version.0)).collect();
                 Ok(())
             }
             Err(refusal) => {

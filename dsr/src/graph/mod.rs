@@ -2,19 +2,29 @@
 //! a version per commit. It knows no process, clock or socket; the store process is a thin shell
 //! around it, and so is everything that works on a file.
 
+mod answers;
 mod apply;
 mod image;
+mod lease;
 
+pub(crate) use answers::Answered;
+pub use answers::TransactionId;
+pub(crate) use apply::STORE;
 pub(crate) use image::{EdgeImage, Frame, NodeImage};
 pub use image::{Image, decode_image};
+pub use lease::LeaseRefusal;
+use lease::Leased;
 
 use crate::arena::allocator::{Allocator, Full, Growth, HeapGrowth};
 use crate::arena::{Address, Arena, Root, record};
 use crate::{
-    Change, Commit, Epoch, NodeId, Operation, Refusal, Schema, Snapshot, Time, Transaction, Version,
+    Change, Commit, Epoch, Manifest, NodeId, Operation, Refusal, Rights, Schema, Snapshot, Time,
+    Transaction, Version,
 };
+use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// What the store asks of a grammar: the meaning of [`Operation::ApplyRule`].
 pub trait RuleEngine: Send + Sync + fmt::Debug {
@@ -28,6 +38,12 @@ pub trait RuleEngine: Send + Sync + fmt::Debug {
         rule: &str,
         binding: &[(String, NodeId)],
     ) -> Result<Vec<Operation>, Refusal>;
+
+    /// The agent that the grammar gives the rule to, if it gives it to one.
+    fn actor(&self, rule: &str) -> Option<&str> {
+        let _ = rule;
+        None
+    }
 }
 
 /// Knobs of the writer.
@@ -35,12 +51,22 @@ pub trait RuleEngine: Send + Sync + fmt::Debug {
 pub struct Limits {
     /// How many bytes of old versions stay readable.
     pub history_bytes: usize,
+    /// How long an old version stays readable at the most, by the clock of
+    /// [`Graph::set_clock`].
+    pub history_age: Duration,
+    /// How many bytes beyond the history are kept for leases; 0 refuses them all.
+    pub lease_bytes: usize,
+    /// How long a lease may be.
+    pub lease_time: Duration,
 }
 
 impl Default for Limits {
     fn default() -> Self {
         Self {
             history_bytes: 16 << 20,
+            history_age: Duration::from_mins(5),
+            lease_bytes: 256 << 20,
+            lease_time: Duration::from_mins(10),
         }
     }
 }
@@ -141,6 +167,11 @@ pub struct Graph {
     epoch: Epoch,
     limits: Limits,
     rules: Option<Arc<dyn RuleEngine>>,
+    rights: Option<Rights>,
+    /// The clients whose last transactions are known, with the versions that those made.
+    clients: BTreeMap<u64, u64>,
+    leases: Vec<Leased>,
+    last_token: u64,
 }
 
 impl Graph {
@@ -172,6 +203,7 @@ impl Graph {
             },
             root: Root {
                 next_id: 1,
+                lineage: epoch.0,
                 ..Root::default()
             },
             schema: Arc::new(schema),
@@ -179,6 +211,10 @@ impl Graph {
             epoch,
             limits: Limits::default(),
             rules: None,
+            rights: None,
+            clients: BTreeMap::new(),
+            leases: Vec::new(),
+            last_token: 0,
         };
         let mut root = graph.root;
         graph.write_schema(&mut root)?;
@@ -195,6 +231,17 @@ impl Graph {
     /// Sets the grammar that [`Operation::ApplyRule`] goes by.
     pub fn set_rules(&mut self, rules: Arc<dyn RuleEngine>) {
         self.rules = Some(rules);
+    }
+
+    /// Sets who may write what. Without, everybody may write everything; with, an agent without a
+    /// manifest may write nothing.
+    pub fn set_rights(&mut self, manifests: impl IntoIterator<Item = Manifest>) {
+        self.rights = Some(Rights::new(manifests, &self.schema));
+    }
+
+    /// Who may write what, where that was said.
+    pub fn rights(&self) -> Option<&Rights> {
+        self.rights.as_ref()
     }
 
     /// The newest version.
@@ -234,6 +281,18 @@ impl Graph {
         self.writer.arena.format(self.epoch);
     }
 
+    /// The first life of the store that this graph goes back to: what is restored from an image is
+    /// of the image's lineage.
+    pub fn lineage(&self) -> Epoch {
+        Epoch(self.root.lineage)
+    }
+
+    /// The last transaction of a client that was applied, if it is still known.
+    pub(crate) fn answered(&self, client: u64) -> Result<Option<Answered>, Refusal> {
+        let found = self.snapshot().answered(client);
+        found.map_err(|error| Refusal::Malformed(error.to_string()))
+    }
+
     /// Bytes that the current and the still readable old versions take.
     pub fn bytes_in_use(&self) -> u64 {
         self.writer.allocator.bytes_in_use()
@@ -249,19 +308,38 @@ impl Graph {
         agent: &str,
         time: Time,
     ) -> Result<(Commit, Change), Refusal> {
+        self.commit_once(transaction, agent, time, None)
+    }
+
+    /// As [`Self::commit`], and notes the transaction's id, by which [`Self::answered`] then knows
+    /// it.
+    pub(crate) fn commit_once(
+        &mut self,
+        transaction: &Transaction,
+        agent: &str,
+        time: Time,
+        id: Option<TransactionId>,
+    ) -> Result<(Commit, Change), Refusal> {
         let before = (Arc::clone(&self.schema), Arc::clone(&self.writers));
-        let outcome = match self.try_commit(transaction, agent, time) {
+        let outcome = match self.try_commit(transaction, agent, time, id) {
             Err(Refusal::OutOfMemory { .. }) => {
                 // History gives way before a commit is refused.
                 self.abandon(&before);
                 self.reclaim(0);
-                self.try_commit(transaction, agent, time)
+                self.revoke_beyond(0);
+                self.try_commit(transaction, agent, time, id)
             }
             other => other,
         };
         match outcome {
-            Ok((root, created, change)) => {
+            Ok((root, created, change, forgotten)) => {
                 self.publish(root);
+                if let Some(id) = id {
+                    self.clients.insert(id.client, root.version);
+                }
+                if let Some(client) = forgotten {
+                    self.clients.remove(&client);
+                }
                 self.reclaim(self.limits.history_bytes);
                 Ok((
                     Commit {
@@ -285,11 +363,12 @@ impl Graph {
         transaction: &Transaction,
         agent: &str,
         time: Time,
-    ) -> Result<(Root, Vec<NodeId>, Change), Refusal> {
+        id: Option<TransactionId>,
+    ) -> Result<apply::Applied, Refusal> {
         let mut work = apply::Work::new(self, agent, time)?;
         work.require(&transaction.preconditions)?;
         work.apply(&transaction.operations)?;
-        work.finish()
+        work.finish(id)
     }
 
     fn abandon(&mut self, before: &(Arc<Schema>, Arc<Vec<String>>)) {
@@ -300,14 +379,17 @@ impl Graph {
 
     fn publish(&mut self, root: Root) {
         self.writer.arena.publish(&root);
-        self.writer.allocator.committed(self.root.version);
+        let allocator = &mut self.writer.allocator;
+        allocator.committed(self.root.version, root.version);
         self.root = root;
     }
 
     fn reclaim(&mut self, keep_bytes: usize) {
-        self.writer
-            .allocator
-            .reclaim(&self.writer.arena, keep_bytes);
+        let Writer {
+            arena, allocator, ..
+        } = &mut self.writer;
+        allocator.reclaim(arena, keep_bytes, self.limits.history_age);
+        self.revoke_beyond(self.limits.lease_bytes);
     }
 
     fn full(&self) -> Refusal {

@@ -2,6 +2,7 @@
 //! be read says what the model said at that version, and a refused transaction changes nothing.
 
 mod indices;
+mod retype;
 
 use super::*;
 use crate::{EdgeKey, EdgeRef, Owner, ReadError, Value};
@@ -229,7 +230,7 @@ proptest! {
         history_bytes in prop_oneof![Just(0), Just(20_000), Just(64 << 20)],
     ) {
         let mut graph = Graph::in_memory(with_indices());
-        graph.set_limits(Limits { history_bytes });
+        graph.set_limits(Limits { history_bytes, ..Limits::default() });
         let mut model = Model::default();
         let mut past = vec![(graph.snapshot(), model.clone())];
         for operations in transactions {
@@ -294,6 +295,7 @@ fn memory_stays_bounded_however_often_an_attribute_is_written() {
     let mut graph = one_node();
     graph.set_limits(Limits {
         history_bytes: 100_000,
+        ..Limits::default()
     });
     for i in 0..20_000 {
         graph
@@ -313,7 +315,10 @@ fn memory_stays_bounded_however_often_an_attribute_is_written() {
 #[test]
 fn a_snapshot_that_was_outlived_says_so_and_gives_nothing() {
     let mut graph = one_node();
-    graph.set_limits(Limits { history_bytes: 0 });
+    graph.set_limits(Limits {
+        history_bytes: 0,
+        ..Limits::default()
+    });
     let old = graph.snapshot();
     for i in 0..10 {
         graph
@@ -432,7 +437,10 @@ fn a_hub_of_ten_thousand_edges_comes_and_goes() {
     transaction.delete_node("hub");
     graph.commit(&transaction, "a", Time::default()).unwrap();
     assert_eq!(graph.snapshot().edges_of_label(label).count(), 0);
-    graph.set_limits(Limits { history_bytes: 0 });
+    graph.set_limits(Limits {
+        history_bytes: 0,
+        ..Limits::default()
+    });
     graph
         .commit(&Transaction::new(), "a", Time::default())
         .unwrap();

@@ -3,8 +3,11 @@
 //! a snapshot is of the newest graph that this process can see, and that a restarted store is
 //! found again without the caller's doing.
 
+mod clock;
 mod commit;
+mod look;
 
+pub use clock::{ClockError, Tick};
 pub use commit::CommitError;
 pub(super) use commit::{ANSWERS, Request, requests};
 
@@ -13,23 +16,24 @@ use commit::{ASKED, SPIN};
 use super::arena::ArenaSubscriber;
 use super::changes::Changes;
 use super::hot::{HotAttribute, HotError, HotSubscriber, OwnPage};
+use super::lease::Tenant;
 use super::{
     Instance, InstanceError, Ipc, IpcNode, MAX_PROCESSES, Publisher, Subscriber, ipc, now,
-    one_at_a_time, pause, service_name, wait,
+    one_at_a_time, pause, service_name,
 };
 use crate::arena::Arena;
 use crate::arena::record;
 use crate::hot::{Hot, Key};
 use crate::{
-    AttributeId, EdgeKey, Epoch, Filter, NodeId, NodeRef, Owner, ReadError, Schema, Snapshot, Time,
+    AttributeId, EdgeKey, Epoch, Filter, NodeId, NodeRef, Owner, ReadError, Schema, Snapshot,
 };
 use iceoryx2::port::client::Client;
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
 use iceoryx2::service::port_factory::event as event_factory;
+use serde::Serialize;
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
@@ -37,11 +41,10 @@ use thiserror::Error;
 
 pub(super) const CHANGES: &str = "graph/changes";
 pub(super) const REQUESTS_EVENT: &str = "graph/wake";
-const CLOCK: &str = "clock";
-const CLOCK_EVENT: &str = "clock/tick";
 
 /// How long a store may take to answer before the asker gives up.
 const PATIENCE: Duration = Duration::from_secs(5);
+
 pub(super) fn event(
     node: &IpcNode,
     name: &str,
@@ -74,23 +77,6 @@ pub enum AttachError {
     Read(#[from] ReadError),
 }
 
-/// Why there is no tick.
-#[derive(Debug, Error)]
-pub enum ClockError {
-    /// The instance cannot be used.
-    #[error(transparent)]
-    Instance(#[from] InstanceError),
-}
-
-/// A step of the world's clock.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Tick {
-    /// How many came before it.
-    pub index: u64,
-    /// The world's time.
-    pub time: Time,
-}
-
 /// A process's membership in an instance.
 #[derive(Debug)]
 pub struct Session {
@@ -105,6 +91,9 @@ pub struct Session {
     hot: Option<HotSubscriber>,
     /// This session's own.
     page: Option<Arc<OwnPage>>,
+    tenant: Option<Arc<Tenant>>,
+    /// An epoch, and the first life of the store that its graph goes back to.
+    lineage: Option<(Epoch, u64)>,
     id: u64,
     sequence: u64,
     spin: Duration,
@@ -146,6 +135,8 @@ impl Session {
             clock: None,
             hot: None,
             page: None,
+            tenant: None,
+            lineage: None,
             id: new_session_id(),
             sequence: 0,
             spin: SPIN,
@@ -261,7 +252,7 @@ impl Session {
                 Some((_, _, schema)) => Arc::clone(schema),
                 None => {
                     let bytes = record::read_blob(&arena, root.schema);
-                    match arena.check(root.version) {
+                    match arena.check(root.version, None) {
                         // Overtaken while reading; the newest version is another by now.
                         Err(ReadError::SnapshotTooOld { .. }) => continue,
                         other => other?,
@@ -332,6 +323,19 @@ impl Session {
         })
     }
 
+    /// The first life of the store whose graph this process sees.
+    fn lineage(&mut self) -> Result<u64, AttachError> {
+        let (epoch, arena) = self.arena()?.ok_or_else(|| self.no_store())?;
+        match self.lineage {
+            Some((known, lineage)) if known == epoch => Ok(lineage),
+            _ => {
+                let lineage = arena.newest_root()?.lineage;
+                self.lineage = Some((epoch, lineage));
+                Ok(lineage)
+            }
+        }
+    }
+
     /// Follows the commits that pass `filter`, from now on.
     ///
     /// # Errors
@@ -367,49 +371,6 @@ impl Session {
         channel: &str,
     ) -> Result<Subscriber<T>, InstanceError> {
         Subscriber::open(&self.node, &format!("channel/{channel}"))
-    }
-
-    /// The world's end of the clock: sends ticks and wakes those who wait for them.
-    ///
-    /// # Errors
-    /// [`InstanceError`].
-    pub fn clock(
-        &self,
-    ) -> Result<impl Fn(Tick) -> Result<(), InstanceError> + use<>, InstanceError> {
-        let publisher = Publisher::<Tick>::open(&self.node, CLOCK)?;
-        let notifier = event(&self.node, CLOCK_EVENT)?
-            .notifier_builder()
-            .create()
-            .map_err(|e| ipc("the clock", e))?;
-        Ok(move |tick| {
-            publisher.send(&tick)?;
-            notifier
-                .notify()
-                .map_err(|e| ipc("the clock", e))
-                .map(|_| ())
-        })
-    }
-
-    /// The newest tick since the last call, waiting up to `patience` for one.
-    ///
-    /// # Errors
-    /// [`ClockError`].
-    pub fn wait_for_tick(&mut self, patience: Duration) -> Result<Option<Tick>, ClockError> {
-        if self.clock.is_none() {
-            let listener = event(&self.node, CLOCK_EVENT)?
-                .listener_builder()
-                .create()
-                .map_err(|e| ipc("the clock", e))?;
-            self.clock = Some((listener, Subscriber::open(&self.node, CLOCK)?));
-        }
-        let Some((listener, ticks)) = &mut self.clock else {
-            return Ok(None);
-        };
-        if let Some(tick) = ticks.newest()? {
-            return Ok(Some(tick));
-        }
-        wait(listener, patience, "waiting for a tick")?;
-        Ok(ticks.newest()?)
     }
 }
 

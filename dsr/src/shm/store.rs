@@ -1,16 +1,21 @@
 //! The store's process: takes requests, lets the graph's single writer decide, answers, and tells
 //! everybody what changed. It guarantees that a request that was answered is not applied again.
 
+mod answer;
+
 use super::arena::ArenaPublisher;
+use super::lease::Landlord;
+use super::presence::Names;
 use super::session::{ANSWERS, CHANGES, REQUESTS_EVENT, Request, event, requests};
 use super::{Instance, InstanceError, Ipc, IpcNode, Publisher, bell, ipc, now, wait};
 use crate::arena::allocator::Full;
-use crate::graph::Image;
+use crate::graph::{Image, STORE};
 use crate::state::Keeper;
 use crate::{
     Change, Commit, Durability, Epoch, Graph, Refusal, Schema, State, StateError, Time,
-    Transaction, Version,
+    Transaction, TransactionId, Version,
 };
+use answer::Answered;
 use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::server::Server;
@@ -44,13 +49,6 @@ type Answer = Result<Commit, Refusal>;
 /// A request that awaits its answer.
 type Asker = ActiveRequest<Ipc, [u8], (), [u8], ()>;
 
-/// What became of a client's last request.
-#[derive(Debug)]
-struct Answered {
-    sequence: u64,
-    answers: Vec<Answer>,
-}
-
 /// Who is to be told once version `last` is on disk.
 #[derive(Debug)]
 struct Waiting {
@@ -64,6 +62,8 @@ struct Waiting {
 const SPIN: Duration = Duration::from_micros(50);
 /// How often a store that does not come to sleep looks for processes that joined.
 const NEWCOMERS: Duration = Duration::from_millis(1);
+/// How often it looks at what is over: old versions, leases.
+const LOOK: Duration = Duration::from_millis(10);
 
 /// The store of an instance: one process holds it, and it alone writes the graph.
 #[derive(Debug)]
@@ -75,8 +75,14 @@ pub struct Store {
     changes: Publisher<Vec<Change>>,
     /// Changes that were committed and not sent.
     unsent: Vec<Change>,
-    /// The last request of each client.
+    /// The last request of each client. What was applied the graph itself knows too; this also
+    /// knows what was refused.
     answered: BTreeMap<u64, Answered>,
+    round: u64,
+    names: Names,
+    landlord: Landlord,
+    began: Instant,
+    next_look: Instant,
     /// Where answers are put together; empty between uses.
     scratch: Vec<u8>,
     last_time: Time,
@@ -120,7 +126,8 @@ impl Store {
             .create()
             .map_err(|e| ipc("the store's listener", e))?;
         let changes = Publisher::open(&node, CHANGES)?;
-        let answered = BTreeMap::new();
+        let began = now();
+        let landlord = Landlord::open(&node, began)?;
         let last_time = Time::default();
         Ok(Self {
             graph,
@@ -129,7 +136,12 @@ impl Store {
             wake,
             changes,
             unsent: Vec::new(),
-            answered,
+            answered: BTreeMap::new(),
+            round: 0,
+            names: Names::default(),
+            landlord,
+            began,
+            next_look: began,
             scratch: Vec::new(),
             last_time,
             keeper: None,
@@ -193,20 +205,28 @@ impl Store {
     /// # Errors
     /// [`Refusal`].
     pub fn commit(&mut self, transaction: &Transaction, time: Time) -> Result<Commit, Refusal> {
-        let answer = self.decide(transaction, "store", time);
+        let answer = self.decide(transaction, STORE, time, None);
         self.tell();
         bell::ring(self.graph.arena());
         answer
     }
 
-    fn decide(&mut self, transaction: &Transaction, agent: &str, time: Time) -> Answer {
+    fn decide(
+        &mut self,
+        transaction: &Transaction,
+        agent: &str,
+        time: Time,
+        id: Option<TransactionId>,
+    ) -> Answer {
         // Agents at the edge of a tick may be a tick apart; the graph's time does not run back.
         self.last_time = self.last_time.max(time);
         let durable = self.durability_of(transaction);
         if durable {
             self.can_keep()?;
         }
-        let (commit, change) = self.graph.commit(transaction, agent, self.last_time)?;
+        let (commit, change) = self
+            .graph
+            .commit_once(transaction, agent, self.last_time, id)?;
         if let Some(keeper) = &self.keeper {
             keeper.note(&change, self.graph.snapshot(), durable);
         }
@@ -330,6 +350,13 @@ impl Store {
     /// Answers every request that is there.
     fn answer_all(&mut self) -> Result<usize, StoreError> {
         let mut served = self.answer_waiting()?;
+        let time = now();
+        if time >= self.next_look {
+            self.next_look = time + LOOK;
+            self.graph
+                .set_clock(time.saturating_duration_since(self.began));
+        }
+        served += self.landlord.serve(&mut self.graph, time)?;
         while let Some(active) = self
             .server
             .receive()
@@ -344,19 +371,8 @@ impl Store {
                     continue;
                 }
             };
-            let known = self.answered.get(&request.client);
-            if known.is_none_or(|known| known.sequence != request.sequence) {
-                let transactions = request.transactions.iter();
-                let answers = transactions
-                    .map(|transaction| self.decide(transaction, &request.agent, request.time))
-                    .collect();
-                // Before the answer: who goes on when it has it finds the changes there.
-                self.tell();
-                let answered = Answered {
-                    sequence: request.sequence,
-                    answers,
-                };
-                self.answered.insert(request.client, answered);
+            if !self.is_answered(&request) {
+                continue;
             }
             let Some(answered) = self.answered.get(&request.client) else {
                 continue;

@@ -136,6 +136,7 @@ mod tests {
         let mut graph = Graph::in_memory(Schema::open());
         graph.set_limits(crate::Limits {
             history_bytes: 4096,
+            ..crate::Limits::default()
         });
         let mut transaction = Transaction::new();
         transaction.create_node("thing", "a", vec![]);

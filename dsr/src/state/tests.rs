@@ -101,7 +101,7 @@ proptest! {
         let folder = TempDir::new().unwrap();
         let mut graph = Graph::in_memory(Schema::open());
         // No history at all: every commit takes the memory of the version before it.
-        graph.set_limits(crate::Limits { history_bytes: 0 });
+        graph.set_limits(crate::Limits { history_bytes: 0, ..crate::Limits::default() });
         let mut state = State::open(folder.path()).unwrap();
         state.replace(&image(&graph)).unwrap();
         let keeper = Keeper::start(state, &graph.snapshot(), Duration::ZERO, Box::new(|| ()));

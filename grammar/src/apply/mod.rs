@@ -221,6 +221,10 @@ impl RuleEngine for Grammar {
                 reason: error.to_string(),
             })
     }
+
+    fn actor(&self, rule: &str) -> Option<&str> {
+        self.rule(rule)?.agent.as_deref()
+    }
 }
 
 #[cfg(test)]

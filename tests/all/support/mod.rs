@@ -6,21 +6,37 @@ pub(crate) use crate::tree::root;
 pub(crate) use program::{Program, Run};
 
 use dsr::Instance;
+use rustix::process::{Pid, Signal, kill_process};
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
+/// A number from the environment that makes a test longer than it usually is.
+pub(crate) fn size(variable: &str, usually: usize) -> usize {
+    std::env::var(variable).map_or(usually, |text| text.parse().unwrap())
+}
+
+/// How often a test repeats what may go wrong: `CORTEX_ROUNDS`, or so often.
+pub(crate) fn rounds(usually: usize) -> u64 {
+    size("CORTEX_ROUNDS", usually) as u64
+}
+
+/// Lets others go on for so long.
+pub(crate) fn pause(time: Duration) {
+    // Nobody sends anything: to receive is to pause.
+    let (_silent, pause) = channel::<()>();
+    assert!(pause.recv_timeout(time).is_err());
+}
+
 /// Asks again and again until there is an answer, or the time is over.
 pub(crate) fn within<T>(patience: Duration, mut ask: impl FnMut() -> Option<T>) -> Option<T> {
     const PAUSE: Duration = Duration::from_millis(5);
-    // Nobody sends anything: to receive is to pause.
-    let (_silent, pause) = channel::<()>();
     let rounds = patience.as_millis() / PAUSE.as_millis();
     (0..=rounds).find_map(|round| {
         if round > 0 {
-            assert!(pause.recv_timeout(PAUSE).is_err());
+            pause(PAUSE);
         }
         ask()
     })
@@ -93,6 +109,21 @@ impl Process {
         let mut said = String::new();
         self.output.read_to_string(&mut said).unwrap();
         said
+    }
+
+    /// Stops it where it is.
+    pub(crate) fn stop(&self) {
+        self.signal(Signal::STOP);
+    }
+
+    /// Lets it go on.
+    pub(crate) fn resume(&self) {
+        self.signal(Signal::CONT);
+    }
+
+    fn signal(&self, signal: Signal) {
+        let id = Pid::from_raw(self.child.id().cast_signed()).unwrap();
+        kill_process(id, signal).unwrap();
     }
 
     /// Kills it with signal 9.

@@ -4,6 +4,7 @@
 use super::{Work, read, touch};
 use crate::arena::Address;
 use crate::arena::table::{AttributeRecord, Place, Stored, Table};
+use crate::rights::Carrier;
 use crate::{AttributeId, NodeId, Owner, Refusal, Touch, TypeId, Value};
 
 impl Work<'_> {
@@ -87,11 +88,13 @@ impl Work<'_> {
     /// Writes an attribute and enters it into a record's table.
     pub(super) fn set_row(
         &mut self,
+        carrier: Carrier,
         table: &mut Table,
         name: &str,
         value: &Value,
     ) -> Result<AttributeId, Refusal> {
         let attribute = self.attribute_id(name)?;
+        self.may(|rights, schema| rights.attribute(schema, carrier, attribute))?;
         self.schema().check_value(attribute, value)?;
         let place = table.find(attribute.0);
         let older = match (self.schema().history(attribute), place) {
@@ -132,7 +135,8 @@ impl Work<'_> {
                 let (address, mut record) = self.node(node)?;
                 let len = record.len();
                 let before = self.indexed_place(&record.table, name)?;
-                let name = self.change_row(&mut record.table, name, value)?;
+                let carrier = Carrier::Node(TypeId(record.type_id));
+                let name = self.change_row(carrier, &mut record.table, name, value)?;
                 let after = value.and_then(Value::place);
                 self.index_value(name, NodeId(record.id), before, after)?;
                 record.version = self.stamp.record;
@@ -149,7 +153,8 @@ impl Work<'_> {
             Owner::Edge(edge) => {
                 let (key, address, mut record) = self.edge(edge)?;
                 let len = record.len();
-                let name = self.change_row(&mut record.table, name, value)?;
+                let carrier = Carrier::Edge(key.label);
+                let name = self.change_row(carrier, &mut record.table, name, value)?;
                 record.version = self.stamp.record;
                 self.put_edge(key, Some((address, len)), &record)?;
                 touch(&mut self.edges, key, (), Touch::Updated, Some(name));
@@ -160,17 +165,19 @@ impl Work<'_> {
 
     fn change_row(
         &mut self,
+        carrier: Carrier,
         table: &mut Table,
         name: &str,
         value: Option<&Value>,
     ) -> Result<AttributeId, Refusal> {
         let Some(value) = value else {
             let attribute = self.attribute_id(name)?;
+            self.may(|rights, schema| rights.attribute(schema, carrier, attribute))?;
             if let Some(Place::At(address)) = table.remove(attribute.0) {
                 self.retire_attribute(address);
             }
             return Ok(attribute);
         };
-        self.set_row(table, name, value)
+        self.set_row(carrier, table, name, value)
     }
 }

@@ -5,6 +5,7 @@ use super::{Work, read, touch};
 use crate::arena::record::{self, EdgeRecord};
 use crate::arena::table::Table;
 use crate::arena::{Address, tree};
+use crate::rights::Carrier;
 use crate::{EdgeKey, EdgeRef, LabelId, NodeId, Refusal, Touch, TypeId, Value};
 
 impl Work<'_> {
@@ -58,6 +59,9 @@ impl Work<'_> {
                 table: Table::default(),
             },
         };
+        if existing.is_none() {
+            self.may(|rights, schema| rights.edge(schema, label))?;
+        }
         let len = record.len();
         record.version = self.stamp.record;
         let how = if existing.is_some() {
@@ -67,7 +71,7 @@ impl Work<'_> {
         };
         touch(&mut self.edges, key, (), how, None);
         for (name, value) in attributes {
-            let name = self.set_row(&mut record.table, name, value)?;
+            let name = self.set_row(Carrier::Edge(label), &mut record.table, name, value)?;
             touch(&mut self.edges, key, (), Touch::Updated, Some(name));
         }
         self.put_edge(key, existing.map(|(_, address)| (address, len)), &record)?;

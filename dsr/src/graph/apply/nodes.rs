@@ -5,6 +5,7 @@ use super::{Work, damaged, read, touch};
 use crate::arena::record::{self, NodeRecord};
 use crate::arena::table::Table;
 use crate::arena::{Address, tree, trie};
+use crate::rights::Carrier;
 use crate::value::hash;
 use crate::{AttributeId, NodeId, NodeRef, Refusal, SchemaError, Touch, TypeId, Value};
 
@@ -59,6 +60,7 @@ impl Work<'_> {
             return Err(SchemaError::BadName(name.to_owned()).into());
         }
         let type_id = self.type_id(type_name)?;
+        self.may(|rights, schema| rights.node(schema, type_id))?;
         let id = id.unwrap_or(NodeId(self.root.next_id));
         for taken in [NodeRef::Id(id), name.into()] {
             if self.find(&taken)?.is_some() {
@@ -83,7 +85,7 @@ impl Work<'_> {
         touch(&mut self.nodes, id, type_id, Touch::Created, None);
         for (name, value) in attributes {
             let before = self.indexed_place(&node.table, name)?;
-            let name = self.set_row(&mut node.table, name, value)?;
+            let name = self.set_row(Carrier::Node(type_id), &mut node.table, name, value)?;
             self.index_value(name, id, before, value.place())?;
             touch(&mut self.nodes, id, type_id, Touch::Updated, Some(name));
         }
@@ -132,6 +134,7 @@ impl Work<'_> {
 
     pub(super) fn delete_node(&mut self, node: &NodeRef) -> Result<(), Refusal> {
         let (_, found) = self.node(node)?;
+        self.may(|rights, schema| rights.node(schema, TypeId(found.type_id)))?;
         let id = NodeId(found.id);
         let edges = {
             let snapshot = self.snapshot();
@@ -184,6 +187,9 @@ impl Work<'_> {
         let id = NodeId(node.id);
         if type_id.0 == node.type_id {
             return Ok(());
+        }
+        for kind in [TypeId(node.type_id), type_id] {
+            self.may(|rights, schema| rights.node(schema, kind))?;
         }
         self.index_type(TypeId(node.type_id), id, false)?;
         self.index_type(type_id, id, true)?;

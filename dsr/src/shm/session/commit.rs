@@ -30,6 +30,8 @@ pub(in crate::shm) struct Request {
     /// The how-manyeth request of it: a repeated number is a repeated request.
     pub(in crate::shm) sequence: u64,
     pub(in crate::shm) agent: String,
+    /// The process that asks.
+    pub(in crate::shm) process: u32,
     pub(in crate::shm) time: Time,
     /// Each is applied whole or not at all, in this order.
     pub(in crate::shm) transactions: Vec<Transaction>,
@@ -41,6 +43,7 @@ struct Asked<'a> {
     client: u64,
     sequence: u64,
     agent: &'a str,
+    process: u32,
     time: Time,
     transactions: &'a [Transaction],
 }
@@ -75,8 +78,9 @@ pub enum CommitError {
         /// The version that it made.
         version: Version,
     },
-    /// The store was restarted meanwhile; whether the transaction was applied is in the next
-    /// snapshot.
+    /// The store was restarted with another graph meanwhile, and what was asked of the one before is
+    /// gone with it; or, where many transactions were sent at once, restarted at all: which of
+    /// them were applied is in the next snapshot.
     #[error("the store was restarted before it answered")]
     StoreRestarted,
     /// The instance cannot be used.
@@ -92,7 +96,8 @@ impl From<InstanceError> for CommitError {
 
 impl Session {
     /// Asks the store for a change and waits for its answer. A request that got lost is sent
-    /// again; the store applies it once.
+    /// again, also to a store that was restarted meanwhile and goes on with the same graph; it is
+    /// applied once.
     ///
     /// # Errors
     /// [`CommitError`].
@@ -128,12 +133,13 @@ impl Session {
             client: self.id,
             sequence: self.sequence,
             agent: &self.agent,
+            process: std::process::id(),
             time,
             transactions,
         };
         let bytes =
             postcard::to_extend(&request, bytes).map_err(|e| ipc("encoding a request", e))?;
-        let answer = self.ask(&bytes);
+        let answer = self.ask(&bytes, transactions.len() == 1);
         self.scratch = bytes;
         let answers = answer?;
         if answers.len() != transactions.len() {
@@ -142,8 +148,15 @@ impl Session {
         Ok(answers)
     }
 
-    fn ask(&mut self, request: &[u8]) -> Result<Vec<Result<Commit, Refusal>>, CommitError> {
-        let (epoch, arena) = self.arena()?.ok_or_else(|| self.no_store())?;
+    /// Sends a request until it is answered; to another store that goes on with the graph only if
+    /// that one knows whether it was applied.
+    fn ask(
+        &mut self,
+        request: &[u8],
+        is_known: bool,
+    ) -> Result<Vec<Result<Commit, Refusal>>, CommitError> {
+        let lineage = self.lineage()?;
+        let (mut epoch, mut arena) = self.arena()?.ok_or_else(|| self.no_store())?;
         let deadline = now() + PATIENCE;
         while now() < deadline {
             let loan = self.client.loan_slice_uninit(request.len());
@@ -175,8 +188,14 @@ impl Session {
                 };
                 bell::sleep(&arena, heard, left);
             }
-            if self.epoch()? != epoch {
-                return Err(CommitError::StoreRestarted);
+            // A store that is about to show itself is waited for.
+            if let Some((newest, memory)) = self.arena()?
+                && newest != epoch
+            {
+                if !is_known || self.lineage()? != lineage {
+                    return Err(CommitError::StoreRestarted);
+                }
+                (epoch, arena) = (newest, memory);
             }
         }
         Err(CommitError::NoAnswer)

@@ -228,7 +228,10 @@ fn a_restored_graph_has_the_history_too() {
 #[test]
 fn memory_of_history_is_given_back() {
     let mut graph = robot(6);
-    graph.set_limits(crate::Limits { history_bytes: 0 });
+    graph.set_limits(crate::Limits {
+        history_bytes: 0,
+        ..crate::Limits::default()
+    });
     let write = |graph: &mut Graph, n: f64| {
         let mut transaction = Transaction::new();
         set_pose(&mut transaction, "world", "robot", turned(n, 0.0));
@@ -248,7 +251,10 @@ fn memory_of_history_is_given_back() {
     };
     let after = empty(&mut graph);
     let mut other = robot(1);
-    other.set_limits(crate::Limits { history_bytes: 0 });
+    other.set_limits(crate::Limits {
+        history_bytes: 0,
+        ..crate::Limits::default()
+    });
     assert_eq!(after, empty(&mut other), "a history is gone with its edge");
 }
 

@@ -1,0 +1,207 @@
+//! What was answered to each client last, kept in the graph itself, version by version. This file
+//! guarantees that a transaction that a version contains is known there by its id, so that it is
+//! not applied again whatever became of the store meanwhile.
+//!
+//! A client waits for an answer before it asks for the next thing, so that its last transaction is
+//! the only one that it can ask for again.
+
+use super::apply::{Work, read};
+use crate::arena::{Address, Arena, tree};
+use crate::{Commit, NodeId, ReadError, Refusal, Snapshot, Time, Version};
+use serde::{Deserialize, Serialize};
+
+/// Clients whose last transactions are known; of more, those that asked last.
+pub(super) const CLIENTS: usize = 256;
+/// Words of a record before the ids of created nodes.
+const HEAD: usize = 4;
+
+/// What tells a transaction from all others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct TransactionId {
+    /// Who asks: a number that no other client has.
+    pub client: u64,
+    /// The how-manyeth transaction of that client; the first is 1.
+    pub sequence: u64,
+}
+
+/// A client's last transaction that was applied.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Answered {
+    pub(crate) id: TransactionId,
+    pub(crate) commit: Commit,
+}
+
+impl Answered {
+    fn words(&self) -> Vec<u64> {
+        let commit = &self.commit;
+        let mut words = vec![
+            self.id.sequence,
+            commit.version.0,
+            commit.time.nanoseconds().cast_unsigned(),
+            commit.created.len() as u64,
+        ];
+        words.extend(commit.created.iter().map(|id| id.0));
+        words
+    }
+
+    fn read(arena: &Arena, client: u64, address: Address) -> Result<Self, Address> {
+        let words = arena.from(address).ok_or(address)?;
+        let at = |i: usize| words.get(i).map(crate::arena::Word::load).ok_or(address);
+        let created = words
+            .get(HEAD..)
+            .and_then(|ids| ids.get(..at(3).ok()? as usize));
+        let created = created.ok_or(address)?.iter().map(|id| NodeId(id.load()));
+        let sequence = at(0)?;
+        Ok(Self {
+            id: TransactionId { client, sequence },
+            commit: Commit {
+                version: Version(at(1)?),
+                time: Time::from_nanoseconds(at(2)?.cast_signed()),
+                created: created.collect(),
+                durable: false,
+            },
+        })
+    }
+}
+
+impl Snapshot {
+    /// The last transaction of a client.
+    pub(crate) fn answered(&self, client: u64) -> Result<Option<Answered>, ReadError> {
+        let found = tree::find(&self.arena, self.root.answers, [client, 0]);
+        self.genuine(found)?
+            .map(|address| self.genuine(Answered::read(&self.arena, client, address)))
+            .transpose()
+    }
+
+    /// The last transaction of every client, by client.
+    pub(crate) fn all_answered(&self) -> Result<Vec<Answered>, ReadError> {
+        let range = tree::Range::new(&self.arena, self.root.answers, [0, 0], [u64::MAX; 2]);
+        let mut range = self.genuine(range)?;
+        let mut all = Vec::new();
+        while let Some(([client, _], address)) = self.genuine(range.next())? {
+            all.push(self.genuine(Answered::read(&self.arena, client, address))?);
+            if all.len() > CLIENTS {
+                return Err(ReadError::Damaged {
+                    address: self.root.answers,
+                });
+            }
+        }
+        Ok(all)
+    }
+}
+
+impl Work<'_> {
+    /// Notes what this commit answers.
+    pub(super) fn remember(&mut self, answered: &Answered) -> Result<(), Refusal> {
+        let client = answered.id.client;
+        let known = &self.graph.clients;
+        if known.len() >= CLIENTS && !known.contains_key(&client) {
+            let oldest = known.iter().min_by_key(|(_, version)| **version);
+            if let Some((&oldest, _)) = oldest {
+                self.forget(oldest)?;
+                let writer = &mut self.graph.writer;
+                let answers = tree::remove(writer, self.root.answers, [oldest, 0]);
+                self.root.answers = self.room(answers)?;
+                self.forgotten = Some(oldest);
+            }
+        }
+        self.forget(client)?;
+        let address = self.graph.writer.write(&answered.words());
+        let address = self.room(address)?;
+        let writer = &mut self.graph.writer;
+        let answers = tree::insert(writer, self.root.answers, [client, 0], address);
+        self.root.answers = self.room(answers)?;
+        Ok(())
+    }
+
+    /// Gives up the record of a client's last transaction.
+    fn forget(&mut self, client: u64) -> Result<(), Refusal> {
+        let arena = &self.graph.writer.arena;
+        let found = read(tree::find(arena, self.root.answers, [client, 0]))?;
+        if let Some(address) = found {
+            let words = read(Answered::read(arena, client, address))?.words().len();
+            self.graph.writer.retire(address, words);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Graph, Image, Limits, Schema, Transaction};
+
+    fn id(client: u64, sequence: u64) -> TransactionId {
+        TransactionId { client, sequence }
+    }
+
+    fn node(name: &str, at: Option<NodeId>) -> Transaction {
+        let mut transaction = Transaction::new();
+        transaction.push(crate::Operation::CreateNode {
+            id: at,
+            type_name: "thing".into(),
+            name: name.into(),
+            attributes: vec![],
+        });
+        transaction
+    }
+
+    fn commit(graph: &mut Graph, id: TransactionId, transaction: &Transaction) -> Commit {
+        let done = graph.commit_once(transaction, "agent", Time::default(), Some(id));
+        done.unwrap().0
+    }
+
+    #[test]
+    fn a_transaction_is_known_by_its_id_also_after_the_graph_was_restored() {
+        let mut graph = Graph::in_memory(Schema::open());
+        let mut both = node("a", Some(NodeId(40)));
+        both.operations
+            .extend(node("b", Some(NodeId(7))).operations);
+        let first = commit(&mut graph, id(5, 1), &both);
+        assert_eq!(first.created, [NodeId(40), NodeId(7)]);
+        let other = commit(&mut graph, id(6, 9), &node("c", None));
+        assert_eq!(graph.answered(5).unwrap().unwrap().commit, first);
+        let image = Image::of(&graph.snapshot()).unwrap();
+        let mut restored = Graph::in_memory(Schema::open());
+        restored.restore(&image).unwrap();
+        assert_eq!(restored.lineage(), graph.lineage());
+        let known = restored.answered(5).unwrap().unwrap();
+        assert_eq!((known.id, known.commit), (id(5, 1), first));
+        assert_eq!(restored.answered(6).unwrap().unwrap().commit, other);
+        let last = commit(&mut restored, id(5, 2), &Transaction::new());
+        assert_eq!(restored.answered(5).unwrap().unwrap().commit, last);
+        assert!(restored.answered(4).unwrap().is_none());
+    }
+
+    #[test]
+    fn a_refused_transaction_is_not_known() {
+        let mut graph = Graph::in_memory(Schema::open());
+        commit(&mut graph, id(1, 1), &node("a", None));
+        let again = graph.commit_once(&node("a", None), "x", Time::default(), Some(id(1, 2)));
+        again.unwrap_err();
+        assert_eq!(graph.answered(1).unwrap().unwrap().id, id(1, 1));
+    }
+
+    #[test]
+    fn of_many_clients_those_that_asked_last_are_known_and_memory_stays_bounded() {
+        let mut graph = Graph::in_memory(Schema::open());
+        graph.set_limits(Limits {
+            history_bytes: 10_000,
+            ..Limits::default()
+        });
+        let many = CLIENTS as u64;
+        let mut bytes = 0;
+        for round in 1..=4 {
+            for client in 0..many * 2 {
+                commit(&mut graph, id(client, round), &Transaction::new());
+            }
+            assert_eq!(graph.snapshot().all_answered().unwrap().len(), CLIENTS);
+            assert!(graph.answered(many - 1).unwrap().is_none());
+            assert!(graph.answered(many).unwrap().is_some());
+            if round == 1 {
+                bytes = graph.bytes_in_use();
+            }
+        }
+        assert!(graph.bytes_in_use() < bytes + 10_000);
+    }
+}

@@ -1,0 +1,98 @@
+//! What the store answers to a request. This file guarantees that a transaction is applied once
+//! however often it is asked for, and for nobody who may not ask.
+
+use super::{Answer, Store};
+use crate::graph::STORE;
+use crate::shm::session::Request;
+use crate::{Refusal, TransactionId};
+use std::cmp::Ordering;
+
+/// Clients whose last requests are remembered.
+const CLIENTS: usize = 1024;
+
+/// What became of a client's last request.
+#[derive(Debug)]
+pub(super) struct Answered {
+    pub(super) sequence: u64,
+    pub(super) answers: Vec<Answer>,
+    /// When it came, in requests.
+    round: u64,
+}
+
+impl Store {
+    /// Sees to it that the request's answers are among the answered, and tells whether they are:
+    /// not those of one that its sender has given up, for it has asked for something else since.
+    pub(super) fn is_answered(&mut self, request: &Request) -> bool {
+        let Request {
+            client, sequence, ..
+        } = *request;
+        let mut known = None;
+        if let Some(last) = self.answered.get(&client) {
+            match sequence.cmp(&last.sequence) {
+                Ordering::Less => return false,
+                Ordering::Equal => return true,
+                Ordering::Greater => {}
+            }
+        } else {
+            // A store that died may have applied it, and this one goes on where that ended.
+            match self.graph.answered(client) {
+                Err(refusal) => known = Some(Err(refusal)),
+                Ok(Some(last)) if sequence < last.id.sequence => return false,
+                Ok(Some(last)) if sequence == last.id.sequence => known = Some(Ok(last.commit)),
+                Ok(_) => {}
+            }
+        }
+        let answers = match known {
+            Some(answer) => vec![answer],
+            None => self.decide_all(request),
+        };
+        // Before the answer: who goes on when it has it finds the changes there.
+        self.tell();
+        if self.answered.len() >= CLIENTS && !self.answered.contains_key(&client) {
+            let oldest = self.answered.iter().min_by_key(|(_, last)| last.round);
+            if let Some((&oldest, _)) = oldest {
+                self.answered.remove(&oldest);
+            }
+        }
+        self.round += 1;
+        let answered = Answered {
+            sequence,
+            answers,
+            round: self.round,
+        };
+        self.answered.insert(client, answered);
+        true
+    }
+
+    fn decide_all(&mut self, request: &Request) -> Vec<Answer> {
+        if let Err(refusal) = self.identify(request) {
+            return vec![Err(refusal); request.transactions.len()];
+        }
+        let Request {
+            client, sequence, ..
+        } = *request;
+        // Of several under one number it could not be told which were applied.
+        let alone = request.transactions.len() == 1;
+        let id = alone.then_some(TransactionId { client, sequence });
+        let transactions = request.transactions.iter();
+        transactions
+            .map(|transaction| self.decide(transaction, &request.agent, request.time, id))
+            .collect()
+    }
+
+    /// Whether the one who asks may go by that name.
+    fn identify(&mut self, request: &Request) -> Result<(), Refusal> {
+        let Some(rights) = self.graph.rights() else {
+            return Ok(());
+        };
+        let agent = request.agent.as_str();
+        if agent == STORE {
+            let why = format!("no agent may call itself `{STORE}`");
+            return Err(Refusal::NotAllowed(why));
+        }
+        match rights.find(agent) {
+            Some(manifest) if !manifest.several() => self.names.claim(agent, request.process),
+            _ => Ok(()),
+        }
+    }
+}
