@@ -270,6 +270,16 @@ pub(crate) enum RulesAction {
     Check {
         /// A grammar (.aggl)
         file: PathBuf,
+        /// Also what does not fit this schema (TOML)
+        #[arg(long, value_name = "S")]
+        schema: Option<PathBuf>,
+        /// Also rules that nothing can make applicable from this world: graph JSON, RoboComp DSR
+        /// JSON or AGM model XML
+        #[arg(long, value_name = "W")]
+        world: Option<PathBuf>,
+        /// Also which rules can disable each other, with the smallest graphs where they do
+        #[arg(long)]
+        conflicts: bool,
     },
     /// List types and rules, also those of a file in which others are broken
     #[command(after_help = "Example:\n  cortex rules list scenarios/care-centre/rules.aggl --json")]
@@ -293,9 +303,8 @@ pub(crate) enum RulesAction {
         /// Only this rule [default: every rule]
         #[arg(long, value_name = "R")]
         rule: Option<String>,
-        /// A world: graph JSON, RoboComp DSR JSON or AGM model XML
-        #[arg(long, value_name = "W")]
-        world: PathBuf,
+        #[command(flatten)]
+        world: WorldArgs,
         /// Count the matches without listing them
         #[arg(long)]
         count: bool,
@@ -315,10 +324,12 @@ pub(crate) enum RulesAction {
         #[arg(long, value_name = "W")]
         world: Option<PathBuf>,
     },
-    /// Show what applying a rule to a world would change; the file stays as it is
+    /// Show what applying a rule to a world would change, or apply it to a running system
     #[command(
-        after_help = "Example:\n  cortex rules apply rules.aggl --rule changeRoom \
-        --world world.json --bind room2=kitchen"
+        after_help = "A file stays as it is; a running system changes unless --dry-run is given.\n\n\
+        Examples:\n  cortex rules apply rules.aggl --rule changeRoom \
+        --world world.json --bind room2=kitchen\n  \
+        cortex rules apply rules.aggl --rule changeRoom --instance care --bind room2=kitchen"
     )]
     Apply {
         /// A grammar (.aggl)
@@ -326,14 +337,48 @@ pub(crate) enum RulesAction {
         /// The rule
         #[arg(long, value_name = "R")]
         rule: String,
-        /// A world: graph JSON, RoboComp DSR JSON or AGM model XML
-        #[arg(long, value_name = "W")]
-        world: PathBuf,
+        #[command(flatten)]
+        world: WorldArgs,
+        /// Only show what would change in the running system
+        #[arg(long, requires = "instance")]
+        dry_run: bool,
         /// The node, by name or id, that a variable of the rule stands for; as many as it takes to
         /// leave one match
         #[arg(long, value_name = "VAR=NODE", num_args = 1.., value_parser = binding)]
         bind: Vec<(String, String)>,
     },
+    /// Draw rules: the left side, the right side, and what keeps, makes and takes away
+    #[command(after_help = "Example:\n  \
+        cortex rules export rules.aggl --dot --rule changeRoom | dot -Tsvg > changeRoom.svg")]
+    Export {
+        /// A grammar (.aggl)
+        file: PathBuf,
+        /// As Graphviz DOT
+        #[arg(long, required = true)]
+        dot: bool,
+        /// Only this rule [default: every rule]
+        #[arg(long, value_name = "R")]
+        rule: Option<String>,
+    },
+    /// Make a running system go by a grammar; one with anything wrong in it is refused whole
+    #[command(after_help = "Example:\n  cortex rules load rules.aggl --instance care")]
+    Load {
+        /// A grammar (.aggl)
+        file: PathBuf,
+        #[command(flatten)]
+        instance: InstanceArgs,
+    },
+}
+
+/// Which world to look at.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct WorldArgs {
+    /// A world: graph JSON, RoboComp DSR JSON or AGM model XML
+    #[arg(long, value_name = "W", required_unless_present = "instance")]
+    pub(crate) world: Option<PathBuf>,
+    /// The running system of this name instead of a file
+    #[arg(long, value_name = "I", conflicts_with = "world")]
+    pub(crate) instance: Option<String>,
 }
 
 fn binding(text: &str) -> Result<(String, String), String> {

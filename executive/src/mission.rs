@@ -17,7 +17,8 @@ pub use record::{
 pub use spec::{Config, Entry, MissionSpec, Planner, RulePlanner};
 
 use crate::monitor::Monitor;
-use dsr::{ReadError, Snapshot, Time, Transaction};
+use dsr::{ReadError, Snapshot, Time, Transaction, Version};
+use grammar::live::Published;
 use grammar::{Goal, Grammar};
 use std::collections::BTreeMap;
 
@@ -40,6 +41,8 @@ struct Search {
 #[derive(Debug)]
 pub struct Executive<P> {
     grammar: Grammar,
+    /// The version of the graph that brought the grammar, if it came from there.
+    rules: Option<Version>,
     missions: Vec<MissionSpec>,
     planner: P,
     config: Config,
@@ -73,6 +76,7 @@ impl<P: Planner> Executive<P> {
         Self {
             monitor: Monitor::new(&grammar),
             grammar,
+            rules: None,
             missions,
             planner,
             config,
@@ -101,6 +105,7 @@ impl<P: Planner> Executive<P> {
     /// # Errors
     /// [`ReadError`]: take a new snapshot; nothing was decided.
     pub fn step(&mut self, now: Time, snapshot: &Snapshot) -> Result<Vec<Transaction>, ReadError> {
+        self.follow_rules(now, snapshot)?;
         let mut missions = record::missions(snapshot)?;
         let mut transactions = self.announce(now, snapshot, &missions)?;
         let attended = self.attend(now, snapshot, &mut missions)?;
@@ -122,7 +127,62 @@ impl<P: Planner> Executive<P> {
         let mut after = before.clone();
         self.pursue(now, snapshot, &mut after)?;
         transactions.extend(record::difference(&before, &after, snapshot.version()));
+        transactions.extend(self.wake(snapshot, &before, &after)?);
         Ok(transactions)
+    }
+
+    /// Goes by the rules that the graph has, as soon as they change.
+    fn follow_rules(&mut self, now: Time, snapshot: &Snapshot) -> Result<(), ReadError> {
+        let version = Published::version(snapshot)?;
+        if version.is_none() || version == self.rules {
+            return Ok(());
+        }
+        let Some(published) = Published::find(snapshot)? else {
+            return Ok(());
+        };
+        let known = std::mem::replace(&mut self.rules, version);
+        match published.read(snapshot.schema()) {
+            Ok(grammar) if grammar == self.grammar => {}
+            Ok(grammar) => {
+                self.monitor = Monitor::new(&grammar);
+                self.grammar = grammar;
+                self.goals.clear();
+                self.search = Search::default();
+                if known.is_some() {
+                    let why = format!("version {} of the graph brought them", published.version);
+                    self.log(now, "the rules have changed".to_owned(), why);
+                }
+            }
+            // The store does not let such rules in; were they there, the old ones are better.
+            Err(defects) => self.log(now, "the old rules stay".to_owned(), defects.to_string()),
+        }
+        Ok(())
+    }
+
+    /// Wakes the rules that steps which have just come to be done activate: the effect of a step
+    /// may have been brought about by the world rather than by applying its rule.
+    fn wake(
+        &self,
+        snapshot: &Snapshot,
+        before: &Mission,
+        after: &Mission,
+    ) -> Result<Option<Transaction>, ReadError> {
+        let was_open = |index| {
+            let step = before.steps.iter().find(|step| step.index == index);
+            step.is_some_and(|step| step.status.is_open())
+        };
+        let mut transaction = Transaction::new();
+        for step in &after.steps {
+            if step.status == StepStatus::Done
+                && was_open(step.index)
+                && let Some(rule) = self.grammar.rule(&step.rule)
+            {
+                transaction
+                    .operations
+                    .extend(self.grammar.waking(snapshot, rule)?);
+            }
+        }
+        Ok((!transaction.operations.is_empty()).then_some(transaction))
     }
 
     /// Puts the missions into the graph that it does not have yet.

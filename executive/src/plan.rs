@@ -151,6 +151,9 @@ pub fn plan(
     options: &Options,
     limits: &mut Limits<'_>,
 ) -> Result<Outcome, ReadError> {
+    let mut options = options.clone();
+    options.awake.extend(grammar.awake(snapshot)?);
+    let options = &options;
     let mut spares = options.spares.min(FEW_SPARES);
     let mut best: Option<Outcome> = None;
     let mut tried = false;

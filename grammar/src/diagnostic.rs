@@ -35,6 +35,8 @@ impl Diagnostic {
 /// How bad a defect is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Severity {
+    /// Worth knowing; nothing is wrong.
+    Note,
     /// Suspicious, but its meaning is clear.
     Warning,
     /// The file is wrong; what could be read of it is there nevertheless.
@@ -44,6 +46,7 @@ pub enum Severity {
 impl fmt::Display for Severity {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
+            Self::Note => "note",
             Self::Warning => "warning",
             Self::Error => "error",
         })
@@ -207,6 +210,44 @@ pub enum Problem {
         /// Type of the node that it enters.
         to: String,
     },
+    /// A combo that no rule says what it does.
+    #[error("this combo cannot be applied as one: {reason}")]
+    NotUnfolded {
+        /// Why.
+        reason: String,
+    },
+    /// A rule whose left side and precondition hold in no graph.
+    #[error("this rule never matches: {reason}")]
+    NeverMatches {
+        /// Why.
+        reason: String,
+    },
+    /// A variable that only asks for one more node.
+    #[error("nothing uses `{name}`: it only asks for one more `{type_name}`")]
+    UnusedVariable {
+        /// The variable.
+        name: String,
+        /// Its type.
+        type_name: String,
+    },
+    /// A rule that no rule can make applicable.
+    #[error("this rule can never be applied: {reason}")]
+    Unreachable {
+        /// What is missing.
+        reason: String,
+    },
+    /// A rule that can make another one inapplicable.
+    #[error("`{first}` can disable `{second}` ({reason}) where there are {graph}")]
+    Conflict {
+        /// The rule that is applied.
+        first: String,
+        /// The rule that is not applicable afterwards.
+        second: String,
+        /// What it lacks then.
+        reason: String,
+        /// The smallest graph where both are applicable, in words.
+        graph: String,
+    },
     /// An included file that could not be read.
     #[error("cannot read the included file `{path}`: {reason}")]
     Include {
@@ -221,7 +262,13 @@ impl Problem {
     /// Whether the file must not be used as it is, or may.
     pub fn severity(&self) -> Severity {
         match self {
-            Self::Incompatible { .. } | Self::UndeclaredParent { .. } => Severity::Warning,
+            Self::Incompatible { .. }
+            | Self::UndeclaredParent { .. }
+            | Self::NotUnfolded { .. }
+            | Self::NeverMatches { .. }
+            | Self::UnusedVariable { .. }
+            | Self::Unreachable { .. } => Severity::Warning,
+            Self::Conflict { .. } => Severity::Note,
             _ => Severity::Error,
         }
     }
@@ -251,6 +298,7 @@ impl Problem {
 impl miette::Diagnostic for Diagnostic {
     fn severity(&self) -> Option<miette::Severity> {
         Some(match self.problem.severity() {
+            Severity::Note => miette::Severity::Advice,
             Severity::Warning => miette::Severity::Warning,
             Severity::Error => miette::Severity::Error,
         })

@@ -3,7 +3,7 @@
 //! Guarantee: `rules` has the rules of every file that was read, in reading order, also where
 //! other rules were broken.
 
-use crate::{Condition, Name, Pattern, Rule, SourceFile};
+use crate::{Condition, Name, Pattern, Rule, SourceFile, Unfolded};
 use dsr::{NodeType, Schema};
 use std::collections::BTreeMap;
 
@@ -18,6 +18,8 @@ pub struct Grammar {
     pub rules: Vec<Rule>,
     /// Combo rules of all files, in the same order.
     pub combos: Vec<Combo>,
+    /// The ordinary rules that the combos stand for; made from `rules` and `combos` by reading.
+    pub unfolded: Vec<Unfolded>,
     /// `include(path)` of all files.
     pub includes: Vec<Include>,
     /// Comment lines of the main file that no rule, combo or include follows.
@@ -27,9 +29,28 @@ pub struct Grammar {
 }
 
 impl Grammar {
-    /// The rule with this name.
+    /// The rule with this name; that of a combo is the one it unfolds into.
     pub fn rule(&self, name: &str) -> Option<&Rule> {
+        let unfolded = || self.unfolding(name).map(|unfolded| &unfolded.rule);
+        self.own_rule(name).or_else(unfolded)
+    }
+
+    /// The rule with this name that a combo unfolds into.
+    pub fn unfolding(&self, name: &str) -> Option<&Unfolded> {
+        self.unfolded
+            .iter()
+            .find(|unfolded| unfolded.rule.name == *name)
+    }
+
+    /// The rule that is written under this name.
+    pub(crate) fn own_rule(&self, name: &str) -> Option<&Rule> {
         self.rules.iter().find(|rule| rule.name == *name)
+    }
+
+    /// Every rule that can be matched and applied: those written, then those unfolded.
+    pub fn all_rules(&self) -> impl Iterator<Item = &Rule> {
+        let unfolded = self.unfolded.iter().map(|unfolded| &unfolded.rule);
+        self.rules.iter().chain(unfolded)
     }
 
     /// Value of the header property `key`; the last one wins.

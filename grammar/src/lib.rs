@@ -64,13 +64,16 @@
 //!   nodes, and names in quotes are unique names of existing nodes.
 #![forbid(unsafe_code)]
 
+mod analysis;
 mod apply;
 mod binding;
 mod check;
 mod diagnostic;
+mod dot;
 mod goal;
 mod grammar;
 mod lexer;
+pub mod live;
 mod load;
 mod matching;
 mod number;
@@ -81,8 +84,10 @@ mod rule;
 mod source;
 #[cfg(test)]
 mod testing;
+mod unfold;
 
-pub use apply::ApplyError;
+pub use analysis::{Conflict, OVERLAY_LIMIT};
+pub use apply::{ApplyError, CHANGE_LIMIT, CHOICE_LIMIT};
 pub use binding::Binding;
 pub use diagnostic::{Diagnostic, Problem, Severity};
 pub use goal::GoalConstants;
@@ -103,3 +108,4 @@ pub use rule::{
     PatternEdge, PatternNode, Rule,
 };
 pub use source::{Name, SourceFile, Span};
+pub use unfold::{OPTIONAL_LIMIT, Unfolded, UnfoldedStep};

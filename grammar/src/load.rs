@@ -53,13 +53,16 @@ pub fn load_grammar(
     };
     reading.read(0);
     let Reading {
-        grammar,
+        mut grammar,
         mut findings,
         broken,
         missing,
         ..
     } = reading;
     findings.extend(check::check_grammar(&grammar, &broken, missing));
+    let (unfolded, not_unfolded) = crate::unfold::unfold(&grammar);
+    grammar.unfolded = unfolded;
+    findings.extend(not_unfolded);
     findings.sort_by_key(|finding| finding.span);
     let diagnostics = diagnostics(findings, &grammar.files);
     (grammar, diagnostics)

@@ -3,6 +3,7 @@
 
 pub(crate) mod oracle;
 pub(crate) mod random;
+mod reference;
 pub(crate) mod repair;
 
 use crate::{Grammar, parse_grammar};

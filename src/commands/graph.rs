@@ -50,6 +50,7 @@ impl Source {
     }
 }
 
+/// Joins a system that runs.
 pub(crate) fn attach(name: &str) -> Result<Session, Failure> {
     let instance = super::instance(name)?;
     if !instance.exists() {

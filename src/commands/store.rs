@@ -4,6 +4,8 @@ use crate::cli::Store as Arguments;
 use crate::supervise::now;
 use crate::{Answer, Failure};
 use dsr::{Durability, Graph, Image, Instance, Pace, Schema, State, Store, Turns};
+use grammar::Grammar;
+use grammar::live::Published;
 use scenarios::Scenario;
 use std::path::Path;
 use std::sync::Arc;
@@ -36,9 +38,9 @@ fn serve(arguments: &Arguments, instance: &Instance, pace: Pace) -> Result<(), F
     let interrupted = super::interruption()?;
     let state = arguments.state.as_deref().map(open_state).transpose()?;
     let mut store = Store::open(instance, schema).map_err(Failure::internal)?;
-    store.graph_mut().set_rules(Arc::new(grammar));
+    store.graph_mut().set_rules(Arc::new(grammar.clone()));
     store.graph_mut().set_rights(manifests);
-    begin(&mut store, arguments, &scenario, state.as_ref())?;
+    begin(&mut store, arguments, &scenario, &grammar, state.as_ref())?;
     if let Some(state) = state {
         let durability = if arguments.durable {
             Durability::OnDisk
@@ -88,12 +90,14 @@ fn begin(
     store: &mut Store,
     arguments: &Arguments,
     scenario: &Scenario,
+    grammar: &Grammar,
     state: Option<&State>,
 ) -> Result<(), Failure> {
     if let Some(path) = &arguments.restore {
         let bytes = std::fs::read(path).map_err(Failure::input)?;
         let image: Image = dsr::decode_image(&bytes).map_err(Failure::input)?;
         store.restore(&image).map_err(Failure::internal)?;
+        go_by_published(store)?;
         tracing::info!("restored version {}", image.version());
         return Ok(());
     }
@@ -107,8 +111,26 @@ fn begin(
         }
         None => scenarios::initial_graph(scenario),
     };
+    if !go_by_published(store)? {
+        let empty = store.graph_mut().snapshot();
+        let rules = grammar.publish(&empty).map_err(Failure::internal)?;
+        first.operations.extend(rules.operations);
+    }
     first.set(scenarios::WORLD, "social", !arguments.no_social);
     let committed = store.commit(&first, scenario.start);
     committed.map_err(Failure::internal)?;
     Ok(())
+}
+
+/// Goes by the rules that the graph has: those that were loaded while the system ran. Whether it has
+/// any.
+fn go_by_published(store: &mut Store) -> Result<bool, Failure> {
+    let snapshot = store.graph_mut().snapshot();
+    let Some(published) = Published::find(&snapshot).map_err(Failure::internal)? else {
+        return Ok(false);
+    };
+    let grammar = published.read(snapshot.schema());
+    let grammar = grammar.map_err(|defects| Failure::Input(defects.into()))?;
+    store.graph_mut().set_rules(Arc::new(grammar));
+    Ok(true)
 }

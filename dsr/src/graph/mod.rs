@@ -44,7 +44,24 @@ pub trait RuleEngine: Send + Sync + fmt::Debug {
         let _ = rule;
         None
     }
+
+    /// Asked about every change before it is published: the engine to go by from it on, where the
+    /// change brings another. `after` is the graph as it will be.
+    ///
+    /// # Errors
+    /// A [`Refusal`] refuses the whole change.
+    fn successor(
+        &self,
+        after: &Snapshot,
+        change: &Change,
+    ) -> Result<Option<Arc<dyn RuleEngine>>, Refusal> {
+        let _ = (after, change);
+        Ok(None)
+    }
 }
+
+/// A transaction applied, not yet published, and the rules to go by from it on where it brings others.
+type Outcome = (apply::Applied, Option<Arc<dyn RuleEngine>>);
 
 /// Knobs of the writer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -332,7 +349,11 @@ impl Graph {
             other => other,
         };
         match outcome {
-            Ok((root, created, change, forgotten)) => {
+            Ok((applied, rules)) => {
+                let (root, created, change, forgotten) = applied;
+                if rules.is_some() {
+                    self.rules = rules;
+                }
                 self.publish(root);
                 if let Some(id) = id {
                     self.clients.insert(id.client, root.version);
@@ -364,11 +385,16 @@ impl Graph {
         agent: &str,
         time: Time,
         id: Option<TransactionId>,
-    ) -> Result<apply::Applied, Refusal> {
+    ) -> Result<Outcome, Refusal> {
         let mut work = apply::Work::new(self, agent, time)?;
         work.require(&transaction.preconditions)?;
         work.apply(&transaction.operations)?;
-        work.finish(id)
+        let applied = work.finish(id)?;
+        let successor = match &self.rules {
+            Some(rules) => rules.successor(&self.snapshot_of(applied.0), &applied.2)?,
+            None => None,
+        };
+        Ok((applied, successor))
     }
 
     fn abandon(&mut self, before: &(Arc<Schema>, Arc<Vec<String>>)) {

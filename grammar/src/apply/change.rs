@@ -11,6 +11,11 @@ use dsr::{
 };
 use std::collections::{BTreeMap, BTreeSet};
 
+/// How many changes quantified effects of one application may make.
+pub const CHANGE_LIMIT: usize = 100_000;
+/// How many choices quantified effects of one application may go through.
+pub const CHOICE_LIMIT: usize = 5_000_000;
+
 /// A node that is there, or one that is being created.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum End {
@@ -38,6 +43,8 @@ pub(super) struct Changes<'a> {
     wanted: BTreeSet<LinkKey>,
     unwanted: BTreeSet<LinkKey>,
     assigned: BTreeMap<(Target, String), Value>,
+    /// How many choices of quantified effects were made.
+    choices: usize,
 }
 
 fn end(slot: Slot) -> Option<End> {
@@ -58,7 +65,26 @@ impl<'a> Changes<'a> {
             wanted: BTreeSet::new(),
             unwanted: BTreeSet::new(),
             assigned: BTreeMap::new(),
+            choices: 0,
         }
+    }
+
+    /// Counts one more choice of a quantified effect.
+    pub(super) fn choose(&mut self) -> Result<(), ApplyError> {
+        self.choices += 1;
+        let changes = self.created.len()
+            + self.deleted.len()
+            + self.retyped.len()
+            + self.wanted.len()
+            + self.unwanted.len()
+            + self.assigned.len();
+        if changes > CHANGE_LIMIT || self.choices > CHOICE_LIMIT {
+            return Err(ApplyError::TooMuch {
+                changes: CHANGE_LIMIT,
+                choices: CHOICE_LIMIT,
+            });
+        }
+        Ok(())
     }
 
     /// A new node; gives the number that stands for it.
@@ -169,18 +195,21 @@ impl<'a> Changes<'a> {
     /// A name for each created node: its type and the first number that nothing is called by.
     fn names(&self) -> Result<Vec<String>, ReadError> {
         let mut names: Vec<String> = Vec::new();
+        // Where to go on: names of one type are taken in turn.
+        let mut next: BTreeMap<&str, u64> = BTreeMap::new();
         for type_name in &self.created {
             let schema = self.snapshot.schema();
             let of_type = schema
                 .find_type(type_name)
                 .map(|id| self.snapshot.count_of_type(id));
-            let mut number = of_type.transpose()?.unwrap_or(0) + 1;
+            let first = of_type.transpose()?.unwrap_or(0) + 1;
+            let number = next.entry(type_name).or_insert(first);
             let name = loop {
                 let name = format!("{type_name}_{number}");
-                if !names.contains(&name) && self.snapshot.find_node_by_name(&name)?.is_none() {
+                *number += 1;
+                if self.snapshot.find_node_by_name(&name)?.is_none() {
                     break name;
                 }
-                number += 1;
             };
             names.push(name);
         }

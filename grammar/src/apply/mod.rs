@@ -8,8 +8,10 @@ mod effect;
 
 use crate::matching::{Compiler, Environment, Link, Slot};
 use crate::{Binding, Grammar, MatchError, Obstacle, Rule};
+pub use change::{CHANGE_LIMIT, CHOICE_LIMIT};
 use change::{Changes, End};
-use dsr::{NodeId, Operation, ReadError, Refusal, RuleEngine, Snapshot};
+use dsr::{Change, NodeId, Operation, ReadError, Refusal, RuleEngine, Snapshot};
+use std::sync::Arc;
 
 /// Why a rule cannot be applied.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -26,6 +28,12 @@ pub enum ApplyError {
     /// The left side or the precondition does not hold.
     #[error("{0}")]
     Obstacle(Box<Obstacle>),
+    /// The rule is dormant, and no rule that activates it has been applied.
+    #[error("`{rule}` is dormant and has not been activated")]
+    Asleep {
+        /// The rule, or the step of a combo.
+        rule: String,
+    },
     /// The rule is `strict` and would leave links hanging.
     #[error(
         "{variable} ({node}) cannot be deleted: the rule is strict and the node has a link `{label}` that the rule does not delete"
@@ -54,6 +62,14 @@ pub enum ApplyError {
         /// and to another.
         second: String,
     },
+    /// Quantified effects would change more, or go through more nodes, than one rule may.
+    #[error("its effects go beyond {changes} changes or {choices} choices of nodes")]
+    TooMuch {
+        /// [`CHANGE_LIMIT`].
+        changes: usize,
+        /// [`CHOICE_LIMIT`].
+        choices: usize,
+    },
     /// The rule could not be looked at.
     #[error(transparent)]
     Match(#[from] MatchError),
@@ -73,7 +89,7 @@ impl Grammar {
     /// The operations that rule `name` makes at `binding`, which binds its left side.
     ///
     /// They come in this order: links deleted, nodes deleted, nodes retyped, nodes created, links
-    /// created, attributes set. Created nodes are named after their type, with the first number
+    /// created, attributes set, rules woken. Created nodes are named after their type, with the first number
     /// that makes the name unique in this snapshot. Conditions and values in effects are read in
     /// `snapshot`, before any change.
     ///
@@ -91,12 +107,15 @@ impl Grammar {
         binding: &Binding,
     ) -> Result<Vec<Operation>, ApplyError> {
         let Some(rule) = self.rule(name) else {
-            let suggestion = dsr::suggest(name, self.rules.iter().map(|rule| &*rule.name));
+            let suggestion = dsr::suggest(name, self.all_rules().map(|rule| &*rule.name));
             return Err(ApplyError::NoRule {
                 rule: name.to_owned(),
                 suggestion,
             });
         };
+        if let Some(asleep) = self.asleep(snapshot, rule)? {
+            return Err(ApplyError::Asleep { rule: asleep });
+        }
         if let Some(obstacle) = self.obstacle(snapshot, rule, binding)? {
             return Err(ApplyError::Obstacle(Box::new(obstacle)));
         }
@@ -123,7 +142,9 @@ impl Grammar {
         if rule.strict {
             no_dangling(rule, snapshot, binding, &changes)?;
         }
-        Ok(changes.into_operations()?)
+        let mut operations = changes.into_operations()?;
+        operations.extend(self.waking(snapshot, rule)?);
+        Ok(operations)
     }
 }
 
@@ -205,6 +226,15 @@ fn no_dangling(
 }
 
 impl RuleEngine for Grammar {
+    fn successor(
+        &self,
+        after: &Snapshot,
+        change: &Change,
+    ) -> Result<Option<Arc<dyn RuleEngine>>, Refusal> {
+        let successor = Self::successor(after, change)?;
+        Ok(successor.map(|grammar| Arc::new(grammar) as _))
+    }
+
     fn expand(
         &self,
         snapshot: &Snapshot,

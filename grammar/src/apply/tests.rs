@@ -309,6 +309,24 @@ fn what_a_rule_aims_at_is_recognised_where_somebody_else_brought_it_about() {
     );
 }
 
+#[test]
+fn effects_that_would_fill_the_memory_are_refused() {
+    let nodes: Vec<String> = (0..20).map(|index| format!("n{index}")).collect();
+    let nodes: Vec<(&str, &str)> = nodes.iter().map(|name| ("t", name.as_str())).collect();
+    let mut many = graph(&nodes, &[]);
+    let before = describe(&many);
+    for body in ["(create n t)", "(when (l a b) (create n t))"] {
+        let all = "(forall a:t b:t c:t (forall d:t e:t f:t ";
+        let grammar = rule(&format!("{{ }} => {{ }} effect {{ {all} {body})) }}"));
+        let error = apply(&mut many, &grammar, "r", &[]).unwrap_err();
+        assert!(
+            error.contains("beyond 100000 changes or 5000000 choices"),
+            "{error}"
+        );
+        assert_eq!(describe(&many), before);
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 

@@ -226,6 +226,7 @@ again : active(2) { go as x where: x.r = x.a }
             f.aggl:11:2: error: no alias `tow` (did you mean `two`?)
             f.aggl:11:14: error: no variable `robot` in the rule of this step
             f.aggl:13:1: error: expected `=` and another `alias.variable`, found `}`
+            f.aggl:14:1: warning: this combo cannot be applied as one: `r` and `a` of one step would be one node
             f.aggl:14:44: warning: `x.r` is a `robot` and `x.a` a `room`: never the same node"#]],
     );
 }

@@ -39,17 +39,17 @@ const SCHEMA_SUBTYPES: [(&str, &[&str]); 3] = [
     ("tool", &["pot"]),
 ];
 
-type LinkKey = (String, String, String);
+pub(crate) type LinkKey = (String, String, String);
 /// Variables and the names of their nodes.
 pub(crate) type Assignment = BTreeMap<String, String>;
 
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Model {
     pub(crate) nodes: BTreeMap<String, String>,
-    links: BTreeSet<LinkKey>,
+    pub(crate) links: BTreeSet<LinkKey>,
     /// Attributes of nodes.
-    values: BTreeMap<(String, String), f64>,
-    link_values: BTreeMap<(LinkKey, String), f64>,
+    pub(crate) values: BTreeMap<(String, String), f64>,
+    pub(crate) link_values: BTreeMap<(LinkKey, String), f64>,
 }
 
 fn is_a(type_name: &str, general: &str) -> bool {

@@ -346,6 +346,7 @@ impl Words {
                     types: Types { declarations },
                     rules,
                     combos,
+                    unfolded: Vec::new(),
                     includes,
                     comments,
                     files: Vec::new(),

@@ -11,6 +11,7 @@ pub(crate) fn repaired(rule: Rule) -> Rule {
     rule.name = "r".into();
     rule.cost = Expression::number(1.0);
     rule.duration = None;
+    rule.dormant = false;
     rule.activates.clear();
     distinct(&mut rule.parameters);
     for side in [&mut rule.left, &mut rule.right] {

@@ -1,10 +1,12 @@
-//! `cortex rules apply`: what a rule would change in a world, tried on a graph of this process.
+//! `cortex rules apply`: what a rule changes. In a file's world it is only tried, on a graph of this
+//! process; in a running system the store applies it.
 
-use super::{Names, find_rule, load, words};
-use crate::commands::graph::{no_such, read_graph};
+use super::{Names, World, find_rule, load, words};
+use crate::cli::WorldArgs;
+use crate::commands::graph::no_such;
 use crate::commands::output::{print, print_json};
 use crate::{Answer, Failure};
-use dsr::{Graph, NodeId, NodeRef, Operation, Owner, Snapshot, Time, Transaction, json};
+use dsr::{CommitError, NodeId, NodeRef, Operation, Owner, Snapshot, Time, Transaction, json};
 use grammar::{ApplyError, Binding, Grammar, Rule};
 use serde_json::{Map, Value as Json, json};
 use std::fmt::Write as _;
@@ -76,20 +78,28 @@ fn the_match(
 pub(super) fn apply(
     file: &Path,
     name: &str,
-    world: &Path,
+    world: &WorldArgs,
+    dry_run: bool,
     bind: &[(String, String)],
     as_json: bool,
 ) -> Result<Answer, Failure> {
     let grammar = load(file)?;
     let rule = find_rule(&grammar, name)?;
-    let mut graph = read_graph(world)?;
-    let snapshot = graph.snapshot();
+    let mut world = World::open(world)?;
+    let snapshot = world.snapshot()?;
     let given = given(&snapshot, bind)?;
     let applied = match the_match(&grammar, &snapshot, rule, &given)? {
-        Ok(binding) => operations(&grammar, &mut graph, rule, &binding)?.map(|o| (binding, o)),
+        Ok(binding) => {
+            let operations = operations(&grammar, &snapshot, rule, &binding)?;
+            let committed = match operations {
+                Ok(operations) => commit(&mut world, dry_run, rule, &binding, operations)?,
+                Err(reason) => Err(reason),
+            };
+            committed.map(|(version, operations)| (binding, version, operations))
+        }
         Err(reason) => Err(reason),
     };
-    let (binding, operations) = match applied {
+    let (binding, version, operations) = match applied {
         Ok(applied) => applied,
         Err(reason) if as_json => {
             print_json(&json!({"rule": name, "applicable": false, "reason": reason}))?;
@@ -114,33 +124,66 @@ pub(super) fn apply(
         let cost = grammar.cost(&snapshot, rule, &binding).ok();
         print_json(&json!({
             "rule": name, "applicable": true, "binding": named, "cost": cost, "operations": rows,
+            "committed": version.is_some(), "version": version,
         }))?;
     } else {
+        if let Some(version) = version {
+            // Writing to a string does not fail.
+            let _ = writeln!(text, "version {version}");
+        }
         print(&text)?;
     }
     Ok(Answer::Yes)
 }
 
-/// What the rule does at a match; or why it, or the graph, does not allow it.
+/// What the rule does at a match, or why it does not.
 fn operations(
     grammar: &Grammar,
-    graph: &mut Graph,
+    snapshot: &Snapshot,
     rule: &Rule,
     binding: &Binding,
 ) -> Result<Result<Vec<Operation>, String>, Failure> {
-    let operations = match grammar.apply(&graph.snapshot(), &rule.name, binding) {
-        Ok(operations) => operations,
-        Err(ApplyError::Match(error)) => return Err(Failure::internal(error)),
-        Err(refused) => return Ok(Err(refused.to_string())),
-    };
-    let transaction = Transaction {
-        operations: operations.clone(),
-        ..Transaction::new()
-    };
-    let committed = graph.commit(&transaction, "rules", Time::default());
-    Ok(committed
-        .map(|_| operations)
-        .map_err(|refusal| refusal.to_string()))
+    match grammar.apply(snapshot, &rule.name, binding) {
+        Ok(operations) => Ok(Ok(operations)),
+        Err(ApplyError::Match(error)) => Err(Failure::internal(error)),
+        Err(refused) => Ok(Err(refused.to_string())),
+    }
+}
+
+/// Operations that are in force from a version of a running system, or would be.
+type Applied = (Option<u64>, Vec<Operation>);
+
+/// Has the change made, or in a file's world tried; or says why the graph does not allow it.
+fn commit(
+    world: &mut World,
+    dry_run: bool,
+    rule: &Rule,
+    binding: &Binding,
+    operations: Vec<Operation>,
+) -> Result<Result<Applied, String>, Failure> {
+    match world {
+        World::Live(_) if dry_run => Ok(Ok((None, operations))),
+        World::Live(session) => {
+            let mut transaction = Transaction::new();
+            transaction.apply_rule(&rule.name, binding.to_refs());
+            let time = session.snapshot().map_err(Failure::internal)?.time();
+            match session.commit(&transaction, time) {
+                Ok(commit) => Ok(Ok((Some(commit.version.0), operations))),
+                Err(CommitError::Refused(refusal)) => Ok(Err(refusal.to_string())),
+                Err(error) => Err(Failure::internal(error)),
+            }
+        }
+        World::File(graph) => {
+            let transaction = Transaction {
+                operations: operations.clone(),
+                ..Transaction::new()
+            };
+            let tried = graph.commit(&transaction, "rules", Time::default());
+            Ok(tried
+                .map(|_| (None, operations))
+                .map_err(|refusal| refusal.to_string()))
+        }
+    }
 }
 
 /// An operation as JSON and as a line.

@@ -2,13 +2,15 @@
 //! what they would change there. Nothing here writes to any file.
 
 mod apply;
+mod check;
 mod explain;
+mod load;
 
-use super::graph::read_graph;
+use super::graph::{attach, read_graph};
 use super::output::{print, print_json, tell};
-use crate::cli::{Rules as Arguments, RulesAction};
+use crate::cli::{Rules as Arguments, RulesAction, WorldArgs};
 use crate::{Answer, Failure};
-use dsr::{NodeId, Snapshot};
+use dsr::{Graph, NodeId, Session, Snapshot};
 use grammar::{Binding, Combo, Defects, Diagnostic, Grammar, Problem, Rule, Severity};
 use serde_json::{Map, Value as Json, json};
 use std::collections::{BTreeMap, BTreeSet};
@@ -19,7 +21,12 @@ use std::time::Instant;
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     let json = arguments.json;
     match &arguments.action {
-        RulesAction::Check { file } => check(file, json),
+        RulesAction::Check {
+            file,
+            schema,
+            world,
+            conflicts,
+        } => check::check(file, schema.as_deref(), world.as_deref(), *conflicts, json),
         RulesAction::List { file } => list(file, json),
         RulesAction::Fmt { file } => format(file, json),
         RulesAction::Match {
@@ -35,8 +42,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
             file,
             rule,
             world,
+            dry_run,
             bind,
-        } => apply::apply(file, rule, world, bind, json),
+        } => apply::apply(file, rule, world, *dry_run, bind, json),
+        RulesAction::Export { file, rule, .. } => export(file, rule.as_deref(), json),
+        RulesAction::Load { file, instance } => load::load(file, &instance.instance, json),
     }
 }
 
@@ -68,31 +78,6 @@ fn warn(diagnostics: Vec<Diagnostic>) {
     if !diagnostics.is_empty() {
         tell(&format!("{}\n", Defects { diagnostics }));
     }
-}
-
-fn check(file: &Path, as_json: bool) -> Result<Answer, Failure> {
-    let (grammar, diagnostics) = read(file)?;
-    if as_json {
-        print_json(&json!({ "diagnostics": diagnostics_json(&diagnostics) }))?;
-    }
-    if grammar::has_errors(&diagnostics) {
-        return Err(Failure::Input(Defects { diagnostics }.into()));
-    }
-    warn(diagnostics);
-    if !as_json {
-        let (rules, combos) = (grammar.rules.len(), grammar.combos.len());
-        let types = grammar.types.names().count();
-        let combos = if combos == 0 {
-            String::new()
-        } else {
-            format!(", {combos} combos")
-        };
-        print(&format!(
-            "{}: {types} types, {rules} rules{combos}\n",
-            file.display()
-        ))?;
-    }
-    Ok(Answer::Yes)
 }
 
 /// A cost as it is where it is a number, else as it is written.
@@ -224,13 +209,11 @@ fn find_rule<'a>(grammar: &'a Grammar, name: &str) -> Result<&'a Rule, Failure> 
         return Ok(rule);
     }
     if grammar.combos.iter().any(|combo| combo.name == *name) {
-        let message = format!("`{name}` is a combo: it has no left-hand side of its own");
-        return Err(Failure::input_with_help(
-            message,
-            "name one of the rules that it is made of",
-        ));
+        let message = format!("the combo `{name}` cannot be applied as one rule");
+        let help = "`cortex rules check` says why; name one of the rules that it is made of";
+        return Err(Failure::input_with_help(message, help));
     }
-    let known = dsr::suggest(name, grammar.rules.iter().map(|rule| &*rule.name));
+    let known = dsr::suggest(name, grammar.all_rules().map(|rule| &*rule.name));
     let help = known.map_or_else(
         || "`cortex rules list` lists what there is".to_owned(),
         |known| format!("did you mean `{known}`?"),
@@ -239,6 +222,44 @@ fn find_rule<'a>(grammar: &'a Grammar, name: &str) -> Result<&'a Rule, Failure> 
         format!("there is no rule `{name}`"),
         help,
     ))
+}
+
+/// A world that rules are tried on: a file's, or that of a running system.
+enum World {
+    File(Box<Graph>),
+    Live(Box<Session>),
+}
+
+impl World {
+    fn open(arguments: &WorldArgs) -> Result<Self, Failure> {
+        match (&arguments.world, &arguments.instance) {
+            (Some(path), _) => Ok(Self::File(Box::new(read_graph(path)?))),
+            (None, Some(instance)) => Ok(Self::Live(Box::new(attach(instance)?))),
+            (None, None) => Err(Failure::input("say which --world or --instance")),
+        }
+    }
+
+    fn snapshot(&mut self) -> Result<Snapshot, Failure> {
+        match self {
+            Self::File(graph) => Ok(graph.snapshot()),
+            Self::Live(session) => session.snapshot().map_err(Failure::internal),
+        }
+    }
+}
+
+fn export(file: &Path, rule: Option<&str>, as_json: bool) -> Result<Answer, Failure> {
+    let grammar = load(file)?;
+    let rules: Vec<&Rule> = match rule {
+        Some(name) => vec![find_rule(&grammar, name)?],
+        None => grammar.all_rules().collect(),
+    };
+    let text: String = rules.into_iter().map(Rule::to_dot).collect();
+    if as_json {
+        print_json(&json!({ "dot": text }))?;
+    } else {
+        print(&text)?;
+    }
+    Ok(Answer::Yes)
 }
 
 /// Names of nodes, each read once.
@@ -320,17 +341,16 @@ fn find(grammar: &Grammar, snapshot: &Snapshot, rule: &Rule, keep: bool) -> Resu
 fn matches(
     file: &Path,
     rule: Option<&str>,
-    world: &Path,
+    world: &WorldArgs,
     only_count: bool,
     as_json: bool,
 ) -> Result<Answer, Failure> {
     let grammar = load(file)?;
     let rules: Vec<&Rule> = match rule {
         Some(name) => vec![find_rule(&grammar, name)?],
-        None => grammar.rules.iter().collect(),
+        None => grammar.all_rules().collect(),
     };
-    let graph = read_graph(world)?;
-    let snapshot = graph.snapshot();
+    let snapshot = World::open(world)?.snapshot()?;
     let mut names = Names::new(&snapshot);
     let mut rows = Vec::new();
     for one in rules {

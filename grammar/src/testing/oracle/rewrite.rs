@@ -7,6 +7,11 @@ use std::collections::{BTreeMap, BTreeSet};
 impl Model {
     /// The graph after the rule at a match, or `None` where it must be refused.
     pub(crate) fn applied(&self, rule: &Rule, at: &Assignment) -> Option<Self> {
+        self.rewritten(rule, at).map(|(model, _)| model)
+    }
+
+    /// The graph after the rule, and its match with what its right side creates.
+    pub(crate) fn rewritten(&self, rule: &Rule, at: &Assignment) -> Option<(Self, Assignment)> {
         let mut plan = Plan::default();
         let mut at = at.clone();
         for node in &rule.right.nodes {
@@ -55,7 +60,7 @@ impl Model {
                 .any(|link| touches(link, node) && !plan.unlinked(rule, &at, link))
         };
         let dangling = plan.deleted.iter().any(hangs);
-        (!(rule.strict && dangling)).then(|| self.after(&plan))
+        (!(rule.strict && dangling)).then(|| (self.after(&plan), at))
     }
 
     fn effects(&self, effects: &[Effect], at: &Assignment, plan: &mut Plan) -> Option<()> {

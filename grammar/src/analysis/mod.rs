@@ -1,0 +1,82 @@
+//! What can be said of rules without a graph: which can never match, which variables do nothing,
+//! which rules nothing can wake, and which can disable each other.
+//!
+//! Guarantee: a rule that is said never to match does not; a conflict that is shown happens in the
+//! graph that it is shown with.
+
+mod complete;
+mod conflict;
+mod never;
+mod reach;
+mod unused;
+
+pub use conflict::{Conflict, OVERLAY_LIMIT};
+
+use crate::parser::Finding;
+use crate::{Diagnostic, Grammar, Name, Problem};
+use dsr::{ReadError, Schema, Snapshot};
+
+/// A finding at a name.
+fn at(name: &Name, problem: Problem) -> Finding {
+    Finding {
+        span: name.span(),
+        problem,
+        related: None,
+    }
+}
+
+impl Grammar {
+    /// Rules that can never match, by themselves or under a schema; variables that nothing uses;
+    /// dormant rules that nothing activates.
+    ///
+    /// # Example
+    /// ```
+    /// let text = "name=x\n===\nodd : active(1) { { a:room b:room } => { a:room b:room }\n\
+    ///             precondition { (and (> a.area 5) (< a.area 3)) } }\n";
+    /// let (grammar, _) = grammar::parse_grammar(text, "x.aggl");
+    /// let found = grammar.analyse(None);
+    /// assert_eq!(found[0].to_string(), "this rule never matches: no `a.area` is (> 5) and (< 3)");
+    /// assert_eq!(found[1].to_string(), "nothing uses `b`: it only asks for one more `room`");
+    /// ```
+    pub fn analyse(&self, schema: Option<&Schema>) -> Vec<Diagnostic> {
+        let mut findings = Vec::new();
+        for rule in &self.rules {
+            if let Some(reason) = never::why_never(self, rule, schema) {
+                findings.push(at(&rule.name, Problem::NeverMatches { reason }));
+            }
+            unused::variables(rule, &mut findings);
+            let wakes = |other: &crate::Rule| other.activates.contains(&rule.name);
+            if rule.dormant && !self.rules.iter().any(wakes) {
+                let reason = "it is dormant, and no rule activates it".to_owned();
+                findings.push(at(&rule.name, Problem::Unreachable { reason }));
+            }
+        }
+        findings.sort_by_key(|finding| finding.span);
+        crate::load::diagnostics(findings, &self.files)
+    }
+
+    /// Rules that no rule can make applicable from what a graph has: even if nothing that once
+    /// held ever ceased to, something on their left side would be missing.
+    ///
+    /// # Errors
+    /// [`ReadError`] where the snapshot cannot be read any more.
+    pub fn unreachable(&self, snapshot: &Snapshot) -> Result<Vec<Diagnostic>, ReadError> {
+        let findings = reach::unreachable(self, snapshot)?;
+        Ok(crate::load::diagnostics(findings, &self.files))
+    }
+
+    /// Which rules can disable which: both match in the graph shown, and after the first was
+    /// applied the second does not match there any more. A rule can disable another match of
+    /// itself.
+    ///
+    /// The graph is the smallest overlay of the two left sides, completed by what simple
+    /// preconditions ask for. Of rules so large that there are more than [`OVERLAY_LIMIT`] ways to
+    /// lay one over the other, the others are not looked at; a conflict that needs a graph which a
+    /// quantified precondition describes only indirectly can be missed.
+    pub fn conflicts(&self) -> Vec<Conflict> {
+        conflict::conflicts(self)
+    }
+}
+
+#[cfg(test)]
+mod tests;

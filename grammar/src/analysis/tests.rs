@@ -1,0 +1,210 @@
+//! Analyses of written rules, and critical pairs against every small graph.
+#![allow(clippy::needless_raw_string_hashes, reason = "expect-test writes them")]
+
+use crate::testing::oracle::Model;
+use crate::testing::random::{AWKWARD, Words, soup};
+use crate::testing::repair::repaired;
+use crate::testing::{CARE, care_centre, read};
+use crate::{Defects, Diagnostic, Grammar, Name, Rule, parse_grammar};
+use dsr::{Graph, Schema, Time};
+use expect_test::{Expect, expect};
+use proptest::prelude::*;
+
+fn check(diagnostics: Vec<Diagnostic>, expected: &Expect) {
+    expected.assert_eq(&Defects { diagnostics }.to_string());
+}
+
+#[test]
+fn rules_that_never_match_and_variables_that_do_nothing_are_told() {
+    let text = "name=x
+===
+same : active(1) { { a:t b:t a->b(l) } => { a:t b:t a->b(l) } precondition { (= a b) } }
+both : active(1) { { a:t a->a(l) } => { a:t } precondition { (not (l a a)) } }
+none : active(1) { { a:t a->a(l) } => { a:t } precondition { (and (> a.n 5) (<= a.n 5)) } }
+some : active(1) { { a:t a->a(l) } => { a:t } precondition { (and (> a.n 5) (<= a.n 6)) } }
+text : active(1) { { a:t a->a(l) } => { a:t } precondition { (or (= 1 2) (= a.s \"x\")) } }
+idle : active(1) { { a:t b:t a->a(l) } => { a:t b:t } precondition { (exists u:t v:t (l a v)) } }
+dormant deep : active(1) { { a:t a->a(l) } => { a:t } }
+";
+    check(
+        read(text).analyse(None),
+        &expect![[r#"
+            test.aggl:3:1: warning: this rule never matches: (= a b) never holds
+            test.aggl:4:1: warning: this rule never matches: `a->a(l)` would have to be there and not
+            test.aggl:5:1: warning: this rule never matches: no `a.n` is (> 5) and (<= 5)
+            test.aggl:8:26: warning: nothing uses `b`: it only asks for one more `t`
+            test.aggl:8:78: warning: nothing uses `u`: it only asks for one more `t`
+            test.aggl:9:9: warning: this rule can never be applied: it is dormant, and no rule activates it"#]],
+    );
+}
+
+#[test]
+fn links_and_values_that_no_schema_allows_are_told() {
+    let schema = r#"
+        [types]
+        thing = []
+        cup = ["thing"]
+        room = []
+        [labels]
+        on = { from = ["thing"], to = ["thing"] }
+        in = { from = ["room", "cup"], to = ["room"] }
+        [attributes]
+        level = { kind = "f64", min = 0.0, max = 1.0 }
+        name = { kind = "string" }
+        "#;
+    let schema = Schema::from_toml("schema", schema).unwrap();
+    let text = "name=x
+===
+fine : active(1) { { a:thing r:room a->r(in) a->a(on) } => { a:thing r:room } }
+odd : active(1) { { a:room r:room a->r(in) } => { a:room r:room } precondition { (on a a) } }
+full : active(1) { { a:cup a->a(on) } => { a:cup } precondition { (> a.level 1) } }
+word : active(1) { { a:cup a->a(on) } => { a:cup } precondition { (< a.name 1) } }
+";
+    check(
+        read(text).analyse(Some(&schema)),
+        &expect![[r#"
+            test.aggl:4:1: warning: this rule never matches: no type of the schema can have all the links of `a`
+            test.aggl:5:1: warning: this rule never matches: no `a.level` is (>= 0, by the schema) and (<= 1, by the schema) and (> 1)
+            test.aggl:6:1: warning: this rule never matches: `a.name` is no number by the schema"#]],
+    );
+}
+
+#[test]
+fn rules_that_nothing_makes_applicable_are_told() {
+    let more = "\
+lay : active(1) activates(hatch) { { r:robot } => { r:robot e:egg r->e(holds) } }
+dormant hatch : active(1) { { r:robot e:egg r->e(holds) } => { r:robot e:bird r->e(holds) } }
+free : active(1) { { r:robot b:bird r->b(holds) } => { r:robot b:bird } }
+cook : active(1) { { e:egg p:pan e->p(into) } => { p:pan } }
+crack : active(1) { { e:egg p:room e->p(in) } => { p:room } }
+";
+    let text = CARE.split_once("===").unwrap().0.to_owned() + "===\n";
+    let grammar = read(&(text + more));
+    check(
+        grammar.unreachable(&care_centre().snapshot()).unwrap(),
+        &expect![[r#"
+            test.aggl:6:1: warning: this rule can never be applied: there is never a `pan`
+            test.aggl:7:1: warning: this rule can never be applied: there is never a link `in` like `e->p`"#]],
+    );
+}
+
+/// One label and one type, so that every graph of three nodes can be tried.
+const ONE: Words = Words {
+    variables: &["a", "b"],
+    types: &["thing"],
+    labels: &["on"],
+    attributes: &["n"],
+    any_literal: false,
+};
+
+/// Every graph of up to `most` nodes.
+fn every_graph(most: usize) -> Vec<Model> {
+    let mut all = Vec::new();
+    for count in 0..=most {
+        for bits in 0..1_u32 << (count * count) {
+            let mut model = Model::default();
+            let name = |index: usize| format!("n{index}");
+            for index in 0..count {
+                model.nodes.insert(name(index), "thing".to_owned());
+            }
+            for pair in (0..count * count).filter(|pair| bits & (1 << pair) != 0) {
+                let link = (name(pair / count), "on".to_owned(), name(pair % count));
+                model.links.insert(link);
+            }
+            all.push(model);
+        }
+    }
+    all.sort_by_key(|model| (model.nodes.len(), model.links.len()));
+    all
+}
+
+/// The size of the smallest graph where the first rule disables the second, by trying.
+fn tried(models: &[Model], first: &Rule, second: &Rule) -> Option<(usize, usize)> {
+    let found = models.iter().find(|model| {
+        let of = |rule: &Rule| -> Vec<_> {
+            let all = model.assignments(rule).into_iter();
+            all.filter(|at| model.rule_holds(rule, at)).collect()
+        };
+        let seconds = of(second);
+        of(first).iter().any(|one| {
+            let Some(after) = model.applied(first, one) else {
+                return false;
+            };
+            seconds.iter().any(|two| {
+                let other = first.name != second.name || one != two;
+                let there = two.values().all(|node| after.nodes.contains_key(node));
+                other && !(there && after.rule_holds(second, two))
+            })
+        })
+    });
+    found.map(|model| (model.nodes.len(), model.links.len()))
+}
+
+fn pair() -> impl Strategy<Value = Grammar> {
+    let body = (ONE.pattern(2, 2), ONE.pattern(2, 2));
+    prop::collection::vec((ONE.rule(), body), 2).prop_map(|rules| {
+        let mut grammar = read("name=x\n===\n");
+        for (index, (rule, (left, right))) in rules.into_iter().enumerate() {
+            let mut rule = Rule {
+                left,
+                right,
+                ..rule
+            };
+            rule.parameters.clear();
+            rule.precondition = None;
+            rule.effect.clear();
+            let mut rule = repaired(rule);
+            rule.name = Name::from(format!("r{index}").as_str());
+            grammar.rules.push(rule);
+        }
+        grammar
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+
+    #[test]
+    fn critical_pairs_are_those_of_every_small_graph(grammar in pair()) {
+        let models = every_graph(3);
+        let found = grammar.conflicts();
+        for first in &grammar.rules {
+            for second in &grammar.rules {
+                let conflict =
+                    found.iter().find(|c| *first.name == *c.first && *second.name == *c.second);
+                let shown = conflict.map(|conflict| {
+                    let mut graph = Graph::in_memory(Schema::open());
+                    graph.commit(&conflict.graph, "test", Time::default()).unwrap();
+                    let model = Model::of_graph(&graph);
+                    // The oracle agrees that it is one.
+                    assert!(tried(std::slice::from_ref(&model), first, second).is_some(), "{first}{second}");
+                    (model.nodes.len(), model.links.len())
+                });
+                prop_assert_eq!(shown, tried(&models, first, second), "{}{}", first, second);
+            }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    #[test]
+    fn nothing_that_can_be_written_breaks_an_analysis(text in soup(), rules in AWKWARD.grammar()) {
+        for text in [text, rules.to_string()] {
+            let (grammar, _) = parse_grammar(&text, "soup");
+            let _ = grammar.analyse(None);
+            let _ = grammar.unreachable(&care_centre().snapshot()).unwrap();
+            for conflict in grammar.conflicts().into_iter().take(3) {
+                prop_assert!(!conflict.graph.operations.is_empty());
+            }
+            for rule in grammar.all_rules() {
+                let dot = rule.to_dot();
+                prop_assert_eq!(dot.matches('{').count() >= 3, true);
+            }
+            let whole = grammar.whole_text();
+            let (again, _) = parse_grammar(&whole, "whole");
+            prop_assert_eq!(again.rules.len(), grammar.rules.len(), "{}", whole);
+        }
+    }
+}

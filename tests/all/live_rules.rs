@@ -1,0 +1,176 @@
+//! Rules that change while a system runs: they reach the store, the executive and its planner, and
+//! bad ones change nothing.
+
+use crate::support::{Program, TestInstance};
+use crate::tree::root;
+use dsr::{Filter, Session, Snapshot};
+use rustix::process::{Pid, Signal, kill_process};
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Stdio};
+use std::time::Duration;
+
+const PATIENCE: Duration = Duration::from_mins(1);
+const LOOK: Duration = Duration::from_millis(200);
+
+/// A process of the system, ended with the test.
+struct Member(Child);
+
+impl Member {
+    fn start(arguments: &[&str]) -> Self {
+        let mut command = Program::command(arguments);
+        command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null());
+        Self(command.spawn().unwrap())
+    }
+}
+
+impl Drop for Member {
+    fn drop(&mut self) {
+        if let Some(pid) = Pid::from_raw(self.0.id().cast_signed()) {
+            let _ = kill_process(pid, Signal::TERM);
+        }
+        drop(self.0.wait());
+    }
+}
+
+/// The care centre with other rules and a mission of its own.
+fn scenario(folder: &Path, rules: &str, goal: &str) {
+    let care = root().join("scenarios/care-centre");
+    let text = fs::read_to_string(care.join("scenario.toml")).unwrap();
+    fs::write(folder.join("scenario.toml"), text).unwrap();
+    fs::write(folder.join("rules.aggl"), rules).unwrap();
+    fs::create_dir(folder.join("missions")).unwrap();
+    fs::write(folder.join("missions/invite.aggt"), goal).unwrap();
+}
+
+/// The texts of an attribute of all nodes of a type.
+fn texts(snapshot: &Snapshot, type_name: &str, attribute: &str) -> Vec<String> {
+    let nodes = snapshot.nodes().map(Result::unwrap);
+    let nodes = nodes.filter(|node| node.type_name() == type_name);
+    nodes
+        .filter_map(|node| node.value(attribute).unwrap())
+        .map(|value| value.as_str().unwrap().to_owned())
+        .collect()
+}
+
+fn until(session: &mut Session, what: &str, holds: impl Fn(&Snapshot) -> bool) {
+    let mut changes = session.changes(Filter::default()).unwrap();
+    let rounds = (PATIENCE.as_millis() / LOOK.as_millis()) as usize;
+    for round in 0.. {
+        if holds(&session.snapshot().unwrap()) {
+            break;
+        }
+        assert!(round < rounds, "{what} never came");
+        changes.wait(LOOK).unwrap();
+        let schema = session.snapshot().unwrap().schema().clone();
+        while changes.next(&schema).unwrap().is_some() {}
+    }
+}
+
+#[test]
+fn a_mission_uses_a_rule_that_was_loaded_later_and_a_bad_grammar_changes_nothing() {
+    let instance = TestInstance::new("live-rules");
+    let folder = tempfile::tempdir().unwrap();
+    let care = fs::read_to_string(root().join("scenarios/care-centre/rules.aggl")).unwrap();
+    // Without the way through doors there is no plan.
+    let without = care
+        .replace("changeRoom :", "passThrough :")
+        .replace("passThrough : active", "passThrough : passive");
+    scenario(
+        folder.path(),
+        &without,
+        "{ \"robot\":robot \"kitchen\":room \"robot\"->\"kitchen\"(in) }\n",
+    );
+    let place = folder.path().to_str().unwrap();
+    let name = instance.name();
+    let common = ["--scenario", place, "--instance", name];
+    let _store = Member::start(&[&["store"], &common[..]].concat());
+    let mut session = Session::attach(&instance.0, "watch", PATIENCE).unwrap();
+    let _executive = Member::start(&[&["agent", "executive"], &common[..]].concat());
+    // Slow, so that the executive does not lose its patience before the rule comes.
+    let _world = Member::start(&[&["agent", "world", "--speed", "0.2"], &common[..]].concat());
+    until(&mut session, "a mission without a plan", |snapshot| {
+        texts(snapshot, "mission", "status").contains(&"running".to_owned())
+            && !texts(snapshot, "mission", "reason").concat().is_empty()
+    });
+    assert_eq!(texts(&session.snapshot().unwrap(), "step", "rule"), [""; 0]);
+
+    // A bad grammar is refused with all that is wrong with it.
+    let bad = folder.path().join("bad.aggl");
+    let broken = care
+        .replace("robot->room2(in)", "robot->room3(in)")
+        .replace("(at robot here)", "(att robot here)");
+    fs::write(&bad, broken).unwrap();
+    let rules_of = |snapshot: &Snapshot| texts(snapshot, "grammar", "rules").concat();
+    let before = rules_of(&session.snapshot().unwrap());
+    let load =
+        |file: &Path| Program::run(&["rules", "load", file.to_str().unwrap(), "--instance", name]);
+    let refused = load(&bad);
+    assert_eq!(refused.status.code(), Some(2));
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert!(said.contains("no variable `room3`"), "{said}");
+    assert!(
+        said.contains("the schema has no label `att` (did you mean `at`?)"),
+        "{said}"
+    );
+    // Neither does it get in beside the verb.
+    let text = fs::read_to_string(&bad).unwrap();
+    let refused = Program::run(&["graph", "set", "grammar.rules", &text, "--instance", name]);
+    assert_eq!(refused.status.code(), Some(2));
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert!(said.contains("the rules are refused"), "{said}");
+    assert_eq!(rules_of(&session.snapshot().unwrap()), before);
+    assert!(before.contains("passThrough"));
+
+    // The new rule reaches the planner ...
+    let better = folder.path().join("better.aggl");
+    fs::write(&better, &care).unwrap();
+    let loaded = load(&better);
+    let said = String::from_utf8(loaded.stderr).unwrap();
+    assert_eq!(loaded.status.code(), Some(0), "{said}");
+    until(&mut session, "a plan with the new rule", |snapshot| {
+        texts(snapshot, "step", "rule").contains(&"changeRoom".to_owned())
+            && texts(snapshot, "step", "status").contains(&"dispatched".to_owned())
+    });
+    // ... and the store, which applies it.
+    let snapshot = session.snapshot().unwrap();
+    let robot = snapshot.find_node_by_name("robot").unwrap().unwrap();
+    let label = snapshot.schema().find_label("in").unwrap();
+    let room = |snapshot: &Snapshot| {
+        let robot = snapshot.find_node(robot.id()).unwrap().unwrap();
+        let key = robot.out_edges_of(label).next().unwrap().unwrap();
+        snapshot.find_node(key.to).unwrap().unwrap().name().unwrap()
+    };
+    let here = room(&snapshot);
+    let file = better.to_str().unwrap();
+    let apply = |rest: &[&str]| {
+        let arguments = [
+            "rules",
+            "apply",
+            file,
+            "--rule",
+            "changeRoom",
+            "--instance",
+            name,
+        ];
+        Program::run(&[&arguments[..], rest].concat())
+    };
+    assert_eq!(here, "entrance");
+    let binding = ["--bind", "room1=entrance", "--bind", "room2=corridor"];
+    let shown = apply(&[&binding[..], &["--dry-run", "--json"]].concat());
+    let said = String::from_utf8(shown.stderr).unwrap();
+    let shown: serde_json::Value = serde_json::from_slice(&shown.stdout).expect(&said);
+    assert_eq!(
+        (&shown["applicable"], &shown["committed"]),
+        (&true.into(), &false.into())
+    );
+    assert_eq!(room(&session.snapshot().unwrap()), here);
+    let applied = apply(&binding);
+    assert_eq!(applied.status.code(), Some(0), "{applied:?}");
+    assert_eq!(room(&session.snapshot().unwrap()), "corridor");
+    // Where it does not hold any more, the answer is no.
+    assert_eq!(apply(&binding).status.code(), Some(1));
+}
