@@ -227,7 +227,7 @@ fn a_store_by_hand_goes_on_from_its_folder_and_says_what_is_wrong_with_another()
     let state = state.to_str().unwrap();
     let instance = TestInstance::new("by-hand");
     let store = ByHand::start(&instance, state, &["--durable"]);
-    let mut session = Session::attach(&instance.0, "agent", PATIENCE).unwrap();
+    let mut session = Session::attach(&instance.0, "cortex-graph", PATIENCE).unwrap();
     let mut transaction = Transaction::new();
     transaction.create_node("tv", "screen", vec![]);
     transaction.set("robot", "max_speed", 0.123);
@@ -255,7 +255,7 @@ fn a_store_by_hand_goes_on_from_its_folder_and_says_what_is_wrong_with_another()
     drop((store, session));
     instance.0.remove().unwrap();
     let store = ByHand::start(&instance, state, &[]);
-    let mut session = Session::attach(&instance.0, "agent", PATIENCE).unwrap();
+    let mut session = Session::attach(&instance.0, "cortex-graph", PATIENCE).unwrap();
     let snapshot = session.snapshot().unwrap();
     assert!(snapshot.version() > commit.version);
     let screen = snapshot.find_node_by_name("screen").unwrap().unwrap();
