@@ -1,11 +1,13 @@
 //! The command line: every verb with its flags. Parsing a flag does nothing but parse it.
 
 mod bench;
+mod graph;
 mod mission;
 mod path;
 mod social;
 
 pub(crate) use bench::{Bench, BenchAction, BenchPeer};
+pub(crate) use graph::{ExportFormat, Graph, GraphAction, GraphSource, Watch};
 pub(crate) use mission::{Mission, MissionAction, SubmitMission};
 pub(crate) use path::{CostModel, Path, PathAlgorithm};
 pub(crate) use social::{Experiment, Social, SocialAction, SocialPicture};
@@ -184,74 +186,6 @@ pub(crate) struct Store {
     pub(crate) supervised: bool,
     #[command(flatten)]
     pub(crate) instance: InstanceArgs,
-}
-
-#[derive(Debug, Clone, Args)]
-pub(crate) struct Graph {
-    #[command(subcommand)]
-    pub(crate) action: GraphAction,
-    #[command(flatten)]
-    pub(crate) source: GraphSource,
-}
-
-/// Which graph.
-#[derive(Debug, Clone, Args)]
-pub(crate) struct GraphSource {
-    /// Name of the running system on this host
-    #[arg(
-        long,
-        value_name = "I",
-        default_value = "default",
-        global = true,
-        conflicts_with = "file"
-    )]
-    pub(crate) instance: String,
-    /// A graph file instead of a running system
-    #[arg(long, value_name = "FILE", global = true)]
-    pub(crate) file: Option<PathBuf>,
-    /// For machines
-    #[arg(long, global = true)]
-    pub(crate) json: bool,
-}
-
-#[derive(Debug, Clone, Subcommand)]
-pub(crate) enum GraphAction {
-    /// Show nodes, attributes and edges
-    #[command(after_help = "Example:\n  cortex graph show person --instance default")]
-    Show {
-        /// Only nodes of this type (or its subtypes), or the node of this name
-        what: Option<String>,
-    },
-    /// Print one attribute: NODE.ATTRIBUTE, or FROM-LABEL->TO.ATTRIBUTE of an edge
-    #[command(after_help = "Example:\n  cortex graph get robot.radius")]
-    Get {
-        /// Which
-        path: String,
-    },
-    /// Set one attribute of a running system
-    #[command(after_help = "Example:\n  cortex graph set robot.max_speed 0.4")]
-    Set {
-        /// NODE.ATTRIBUTE, or FROM-LABEL->TO.ATTRIBUTE
-        path: String,
-        /// The value, as in graph JSON
-        value: String,
-    },
-    /// Print commits as they come
-    #[command(after_help = "Example:\n  cortex graph watch in --count 10")]
-    Watch {
-        /// Only commits that touch this type, label, attribute or node
-        filter: Option<String>,
-        /// End after so many
-        #[arg(long, value_name = "N")]
-        count: Option<u64>,
-    },
-    /// Print the whole graph: json or dot
-    #[command(after_help = "Example:\n  cortex graph export json --file world.json")]
-    Export {
-        /// json or dot
-        #[arg(value_parser = ["json", "dot"])]
-        format: String,
-    },
 }
 
 #[derive(Debug, Clone, Args)]

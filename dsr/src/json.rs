@@ -1,5 +1,5 @@
 //! Graph JSON, format `dsr/1`: a whole graph as people and other programs read it. This file
-//! guarantees that what was written can be read again without loss.
+//! guarantees that what was written can be read again without loss, by [`crate::interchange::read`].
 //!
 //! ```json
 //! {"format":"dsr/1",
@@ -11,76 +11,27 @@
 //! other is `{"type":KIND,"value":...}` with a kind of [`ValueKind::name`]. Whole `f64` have a
 //! decimal point. `u64` are strings, for most programs read JSON numbers as `f64`.
 
-use crate::{NodeId, Operation, Pose, ReadError, Snapshot, Transaction, Value, ValueKind};
-use nalgebra::{Quaternion, Translation3, UnitQuaternion};
-use serde::{Deserialize, Serialize};
+use crate::{Pose, ReadError, Snapshot, Value, ValueKind};
+use nalgebra::{Isometry2, Quaternion, Translation3, UnitQuaternion, Vector2};
+use serde::Serialize;
 use serde_json::{Map, Value as Json, json};
-use thiserror::Error;
 
 /// The name of the format.
 pub const FORMAT: &str = "dsr/1";
 
-/// Why a graph file cannot be read.
-#[derive(Debug, Error)]
-pub enum JsonError {
-    /// It is not JSON, or not of this shape.
-    #[error("{0}")]
-    Syntax(#[from] serde_json::Error),
-    /// It is of another format.
-    #[error("the format is `{0}`, not `{FORMAT}`")]
-    Format(String),
-    /// An attribute cannot be read.
-    #[error("attribute `{attribute}` of {owner}: {reason}")]
-    Attribute {
-        /// Of what.
-        owner: String,
-        /// Which.
-        attribute: String,
-        /// What is wrong.
-        reason: String,
-    },
-    /// An edge ends at a node that the file does not have.
-    #[error("an edge `{label}` ends at node {node}, which is not in the file")]
-    NoSuchNode {
-        /// The edge's label.
-        label: String,
-        /// The node.
-        node: u64,
-    },
-}
-
-#[derive(Debug, Serialize, Deserialize)]
-struct File {
-    format: String,
-    nodes: Vec<NodeRow>,
-    #[serde(default)]
-    edges: Vec<EdgeRow>,
-}
-
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Serialize)]
 struct NodeRow {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    id: Option<u64>,
+    id: u64,
     r#type: String,
     name: String,
-    #[serde(default)]
     attributes: Map<String, Json>,
 }
 
-/// A node as an edge names it: by id, or by name where the file has no ids.
-#[derive(Debug, Serialize, Deserialize)]
-#[serde(untagged)]
-enum End {
-    Id(u64),
-    Name(String),
-}
-
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Serialize)]
 struct EdgeRow {
-    from: End,
+    from: u64,
     label: String,
-    to: End,
-    #[serde(default)]
+    to: u64,
     attributes: Map<String, Json>,
 }
 
@@ -121,7 +72,8 @@ pub fn value_to_json(value: &Value) -> Json {
 }
 
 /// A value from JSON: the inverse of [`value_to_json`]. A plain whole number is an `i64` and a
-/// plain array of numbers an `f64` vector (up to 6) or list, unless `expected` says otherwise.
+/// plain array of numbers an `f64` vector (up to 6) or list, unless `expected` says otherwise. A pose
+/// may also be an array: translation and rotation (i, j, k, w), or x, y and heading on the floor.
 ///
 /// # Errors
 /// What is wrong, in words.
@@ -203,11 +155,16 @@ fn decode(kind: ValueKind, json: &Json) -> Option<Value> {
                 let row = json.get(name)?.as_array()?.iter().map(Json::as_f64);
                 row.collect::<Option<Vec<_>>>()
             };
-            let (translation, rotation) = (row("translation")?, row("rotation")?);
-            let (&[x, y, z], &[i, j, k, w]) = (
-                translation.first_chunk::<3>()?,
-                rotation.first_chunk::<4>()?,
-            );
+            let row = match json {
+                Json::Array(_) => numbers()?,
+                _ => [row("translation")?, row("rotation")?].concat(),
+            };
+            if let &[x, y, heading] = &row[..] {
+                return Some(Isometry2::new(Vector2::new(x, y), heading).into());
+            }
+            let &[x, y, z, i, j, k, w] = &row[..] else {
+                return None;
+            };
             let quaternion = Quaternion::new(w, i, j, k);
             // Written by us it is of length one already, and stays what it was to the last bit.
             let rotation = if (quaternion.norm() - 1.0).abs() < 1e-12 {
@@ -240,7 +197,7 @@ pub fn to_json(snapshot: &Snapshot) -> Result<Json, ReadError> {
     for node in snapshot.nodes() {
         let node = node?;
         nodes.push(NodeRow {
-            id: Some(node.id().0),
+            id: node.id().0,
             r#type: node.type_name().to_owned(),
             name: node.name()?,
             attributes: attributes(node.attributes()?),
@@ -252,85 +209,21 @@ pub fn to_json(snapshot: &Snapshot) -> Result<Json, ReadError> {
                 .map(|edge| edge.attributes())
                 .transpose()?;
             edges.push(EdgeRow {
-                from: End::Id(key.from.0),
+                from: key.from.0,
                 label: schema.label_name(key.label).to_owned(),
-                to: End::Id(key.to.0),
+                to: key.to.0,
                 attributes: attributes(found.unwrap_or_default()),
             });
         }
     }
     nodes.sort_by_key(|node| node.id);
-    let id = |end: &End| if let End::Id(id) = end { *id } else { 0 };
-    edges.sort_by(|a, b| {
-        (id(&a.from), &a.label, id(&a.to)).cmp(&(id(&b.from), &b.label, id(&b.to)))
-    });
-    Ok(json!(File {
-        format: FORMAT.to_owned(),
-        nodes,
-        edges
-    }))
-}
-
-/// The transaction that makes, on an empty graph, what the graph JSON says.
-///
-/// # Errors
-/// [`JsonError`].
-pub fn from_json(text: &str) -> Result<Transaction, JsonError> {
-    let text = text.trim_start_matches('\u{feff}');
-    let file: File = serde_json::from_str(text)?;
-    if file.format != FORMAT {
-        return Err(JsonError::Format(file.format));
-    }
-    let attributes = |owner: &str, map: Map<String, Json>| {
-        map.into_iter()
-            .map(|(attribute, json)| match value_from_json(&json, None) {
-                Ok(value) => Ok((attribute, value)),
-                Err(reason) => Err(JsonError::Attribute {
-                    owner: owner.to_owned(),
-                    attribute,
-                    reason,
-                }),
-            })
-            .collect::<Result<Vec<_>, _>>()
-    };
-    let known: std::collections::BTreeSet<u64> = file.nodes.iter().filter_map(|n| n.id).collect();
-    let mut transaction = Transaction::new();
-    for node in file.nodes {
-        transaction.push(Operation::CreateNode {
-            id: node.id.map(NodeId),
-            attributes: attributes(&node.name, node.attributes)?,
-            type_name: node.r#type,
-            name: node.name,
-        });
-    }
-    for edge in file.edges {
-        let end = |end: End| match end {
-            End::Id(id) if !known.contains(&id) => Err(JsonError::NoSuchNode {
-                label: edge.label.clone(),
-                node: id,
-            }),
-            End::Id(id) => Ok(NodeId(id).into()),
-            End::Name(name) => Ok(crate::NodeRef::Name(name)),
-        };
-        let (from, to) = (end(edge.from)?, end(edge.to)?);
-        let key = crate::EdgeRef {
-            from,
-            label: edge.label.clone(),
-            to,
-        };
-        let attributes = attributes(&key.to_string(), edge.attributes)?;
-        transaction.push(Operation::CreateEdge {
-            edge: key,
-            attributes,
-        });
-    }
-    Ok(transaction)
+    edges.sort_by(|a, b| (a.from, &a.label, a.to).cmp(&(b.from, &b.label, b.to)));
+    Ok(json!({"format": FORMAT, "nodes": nodes, "edges": edges}))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Graph, Schema, Time};
     use proptest::prelude::*;
 
     proptest! {
@@ -340,42 +233,5 @@ mod tests {
             let back = value_from_json(&serde_json::from_str(&text).unwrap(), None).unwrap();
             prop_assert_eq!(back, value);
         }
-    }
-
-    #[test]
-    fn a_graph_survives_json() {
-        let text = r#"{"format":"dsr/1","nodes":[
-            {"id":7,"type":"room","name":"kitchen","attributes":{"area":12.0,"n":3}},
-            {"id":2,"type":"robot","name":"shelly","attributes":{"id":{"type":"u64","value":"18446744073709551615"}}}],
-            "edges":[{"from":2,"label":"in","to":7,"attributes":{"since":{"type":"f32_list","value":[0.5]}}}]}"#;
-        let mut graph = Graph::in_memory(Schema::open());
-        graph
-            .commit(&from_json(text).unwrap(), "test", Time::default())
-            .unwrap();
-        let once = to_json(&graph.snapshot()).unwrap();
-        let mut again = Graph::in_memory(Schema::open());
-        again
-            .commit(
-                &from_json(&once.to_string()).unwrap(),
-                "test",
-                Time::default(),
-            )
-            .unwrap();
-        assert_eq!(to_json(&again.snapshot()).unwrap(), once);
-        assert_eq!(once["nodes"][1]["attributes"]["area"].to_string(), "12.0");
-    }
-
-    #[test]
-    fn broken_files_are_told_with_their_place() {
-        let place = from_json("{\"format\":\"dsr/1\",\n\"nodes\":[{\"id\":1,").unwrap_err();
-        assert!(
-            place.to_string().ends_with("at line 2 column 17"),
-            "{place}"
-        );
-        let far = r#"{"format":"dsr/1","nodes":[],"edges":[{"from":1,"label":"in","to":2}]}"#;
-        assert!(matches!(
-            from_json(far),
-            Err(JsonError::NoSuchNode { node: 1, .. })
-        ));
     }
 }

@@ -9,6 +9,7 @@
 
 mod arena;
 mod change;
+mod difference;
 mod graph;
 mod hot;
 mod ids;
@@ -31,6 +32,7 @@ pub mod wire;
 
 pub use arena::ReadError;
 pub use change::{Change, EdgeChange, Filter, NodeChange, RuleApplication, Touch};
+pub use difference::{Difference, bring_over, differences};
 pub use graph::{Graph, Image, LeaseRefusal, Limits, RuleEngine, TransactionId, decode_image};
 pub use ids::{AttributeId, EdgeKey, Epoch, LabelId, NodeId, TypeId, Version, WriterId};
 pub use process::{Begin, Pace, TurnError, Turns, done_line, turn_line};

@@ -20,15 +20,21 @@ fn commit(transaction: &Transaction) {
 
 /// Graph JSON (`dsr/1`).
 pub fn graph_json(bytes: &[u8]) {
-    if let Ok(transaction) = dsr::json::from_json(&text(bytes)) {
-        commit(&transaction);
+    // As under a schema that says of which kind plain numbers are.
+    let schema = "[types]\n[labels]\n[attributes]\nn = { kind = \"f64\" }\n";
+    if let Ok(schema) = dsr::Schema::from_toml("schema.toml", schema) {
+        let text = text(bytes);
+        if let Ok(world) = dsr::interchange::read(&text, &schema) {
+            commit(&world.transaction());
+            world.check(&text, &schema);
+        }
     }
 }
 
 /// RoboComp DSR JSON, AGM model XML, or graph JSON: whichever it looks like.
 pub fn world(bytes: &[u8]) {
-    if let Ok(import) = dsr::interchange::read(&text(bytes)) {
-        commit(&import.transaction);
+    if let Ok(world) = dsr::interchange::read(&text(bytes), &dsr::Schema::open()) {
+        commit(&world.transaction());
     }
 }
 

@@ -54,10 +54,10 @@ fn plan(rules: &str, task: &Task, options: &Options) -> Result<(f64, Outcome), F
     let (grammar, _) = grammar::parse_grammar(rules, "rules.aggl");
     let goal = grammar::parse_goal(&task.goal, "goal.aggt", &grammar.types)
         .map_err(|defects| Failure::Internal(defects.into()))?;
-    let import = interchange::read(&task.world).map_err(Failure::internal)?;
+    let import = interchange::read(&task.world, &Schema::open()).map_err(Failure::internal)?;
     let mut graph = Graph::in_memory(Schema::open());
     graph
-        .commit(&import.transaction, "file", Time::default())
+        .commit(&import.transaction(), "file", Time::default())
         .map_err(Failure::internal)?;
     let limits = &mut Limits::new();
     let outcome = executive::plan(&grammar, &graph.snapshot(), &goal, options, limits)

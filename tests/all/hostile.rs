@@ -129,7 +129,8 @@ const AGM: &str = r#"<AGMModel><symbol id="1" type="robot"/><symbol id="2" type=
     <attribute key="imName" value="kitchen"/></symbol><link src="1" dst="2" label="in"/></AGMModel>"#;
 
 fn transaction() -> Transaction {
-    dsr::json::from_json(GRAPH).unwrap()
+    let world = dsr::interchange::read(GRAPH, &dsr::Schema::open());
+    world.unwrap().transaction()
 }
 
 #[test]

@@ -26,3 +26,4 @@ mod state;
 mod store;
 mod support;
 mod tree;
+mod verbs;

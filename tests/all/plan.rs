@@ -166,7 +166,7 @@ fn broken_input_is_told_with_its_place() {
             RULES,
             "{\"format\":\"dsr/1\",\n\"nodes\":[{",
             goal,
-            "line 2",
+            "world.json:2:",
         ),
         (RULES, &*world, "{ 1:robt }", "goal.aggt:1:5"),
     ] {

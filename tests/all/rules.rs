@@ -295,7 +295,7 @@ fn worlds_of_other_systems_are_matched_and_exported() {
     assert_eq!(broken.status.code(), Some(2));
     let told = String::from_utf8(broken.stderr).unwrap();
     assert!(
-        told.contains("line 2 column 1: `<symbol>` has no `type`"),
+        told.contains("world:2:1") && told.contains("`<symbol>` has no `type`"),
         "{told}"
     );
 }

@@ -17,6 +17,7 @@ use lease::Leased;
 
 use crate::arena::allocator::{Allocator, Full, Growth, HeapGrowth};
 use crate::arena::{Address, Arena, Root, record};
+use crate::interchange::{Stamp, World};
 use crate::{
     Change, Commit, Epoch, Manifest, NodeId, Operation, Refusal, Rights, Schema, Snapshot, Time,
     Transaction, Version,
@@ -328,6 +329,21 @@ impl Graph {
         self.commit_once(transaction, agent, time, None)
     }
 
+    /// Makes what a file says, each attribute with the time and agent that the file gives it, else
+    /// `time` and `agent`.
+    ///
+    /// # Errors
+    /// A [`Refusal`]; the graph is then as it was.
+    pub fn import(
+        &mut self,
+        world: &World,
+        agent: &str,
+        time: Time,
+    ) -> Result<(Commit, Change), Refusal> {
+        let transaction = world.transaction();
+        self.commit_stamped(&transaction, &world.stamps(), agent, time, None)
+    }
+
     /// As [`Self::commit`], and notes the transaction's id, by which [`Self::answered`] then knows
     /// it.
     pub(crate) fn commit_once(
@@ -337,14 +353,25 @@ impl Graph {
         time: Time,
         id: Option<TransactionId>,
     ) -> Result<(Commit, Change), Refusal> {
+        self.commit_stamped(transaction, &[], agent, time, id)
+    }
+
+    fn commit_stamped(
+        &mut self,
+        transaction: &Transaction,
+        stamps: &[Stamp],
+        agent: &str,
+        time: Time,
+        id: Option<TransactionId>,
+    ) -> Result<(Commit, Change), Refusal> {
         let before = (Arc::clone(&self.schema), Arc::clone(&self.writers));
-        let outcome = match self.try_commit(transaction, agent, time, id) {
+        let outcome = match self.try_commit(transaction, stamps, agent, time, id) {
             Err(Refusal::OutOfMemory { .. }) => {
                 // History gives way before a commit is refused.
                 self.abandon(&before);
                 self.reclaim(0);
                 self.revoke_beyond(0);
-                self.try_commit(transaction, agent, time, id)
+                self.try_commit(transaction, stamps, agent, time, id)
             }
             other => other,
         };
@@ -382,6 +409,7 @@ impl Graph {
     fn try_commit(
         &mut self,
         transaction: &Transaction,
+        stamps: &[Stamp],
         agent: &str,
         time: Time,
         id: Option<TransactionId>,
@@ -389,6 +417,7 @@ impl Graph {
         let mut work = apply::Work::new(self, agent, time)?;
         work.require(&transaction.preconditions)?;
         work.apply(&transaction.operations)?;
+        stamps.iter().try_for_each(|stamp| work.stamp(stamp))?;
         let applied = work.finish(id)?;
         let successor = match &self.rules {
             Some(rules) => rules.successor(&self.snapshot_of(applied.0), &applied.2)?,

@@ -1,143 +1,226 @@
-//! AGM model XML: symbols and links, all attributes strings. Guarantees that each error names its
-//! line and column. A symbol's name is its attribute `imName` where no other symbol has it, else
-//! its id; an `enabled` of a link is kept as an attribute of that name.
+//! AGM model XML: symbols and links, all attributes strings. A symbol's name is its attribute
+//! `imName` where no other symbol has it, else its id; an `enabled` of a link is kept as an attribute of
+//! that name.
 
-use super::unique_names;
-use crate::{EdgeRef, NodeId, NodeRef, Operation, Transaction, Value};
+use super::place::{Span, Text};
+use super::world::{Format, Word, World, WorldAttribute, WorldEdge, WorldNode};
+use super::{Problem, unique_names};
+use crate::{NodeId, NodeRef};
 use roxmltree::{Document, Node, ParsingOptions};
 use std::collections::BTreeMap;
-use thiserror::Error;
 
 /// More elements, attributes and texts than this in one file are refused.
 const NODE_LIMIT: u32 = 8_000_000;
 
-/// Why AGM model XML cannot be read.
-#[derive(Debug, Error)]
-pub enum AgmError {
-    /// It is not XML.
-    #[error("{0}")]
-    Syntax(#[from] roxmltree::Error),
-    /// An element that does not belong where it stands.
-    #[error("line {line} column {column}: expected {expected}, found `<{found}>`")]
-    Element {
-        /// Line, from 1.
-        line: u32,
-        /// Column, from 1.
-        column: u32,
-        /// What may stand here.
-        expected: &'static str,
-        /// What stands here.
-        found: String,
-    },
-    /// Something that an element must say is missing.
-    #[error("line {line} column {column}: `<{element}>` has no `{attribute}`")]
-    Missing {
-        /// Line, from 1.
-        line: u32,
-        /// Column, from 1.
-        column: u32,
-        /// The element.
-        element: String,
-        /// What it does not say.
-        attribute: &'static str,
-    },
-    /// Two symbols with one id.
-    #[error("line {line} column {column}: there is a symbol `{id}` already")]
-    Duplicate {
-        /// Line, from 1.
-        line: u32,
-        /// Column, from 1.
-        column: u32,
-        /// The id.
-        id: String,
-    },
-    /// A link that ends at a symbol that the file does not have.
-    #[error("line {line} column {column}: there is no symbol `{id}` for the link `{label}`")]
-    NoSuchSymbol {
-        /// Line, from 1.
-        line: u32,
-        /// Column, from 1.
-        column: u32,
-        /// The link's label.
-        label: String,
-        /// The id.
-        id: String,
-    },
+struct Reader<'a, 'b> {
+    text: &'b Text<'a>,
+    problems: &'b mut Vec<Problem>,
 }
 
-struct Symbol<'a> {
-    id: &'a str,
-    type_name: &'a str,
-    attributes: BTreeMap<&'a str, &'a str>,
-}
-
-/// A symbol as operations name it.
-struct Known {
-    name: String,
-    id: Option<NodeId>,
-}
-
-pub(super) fn read(text: &str) -> Result<Transaction, AgmError> {
+pub(super) fn read(text: &Text<'_>, problems: &mut Vec<Problem>) -> Option<World> {
     let options = ParsingOptions {
         nodes_limit: NODE_LIMIT,
         ..ParsingOptions::default()
     };
-    let document = Document::parse_with_options(text, options)?;
+    let document = match Document::parse_with_options(text.body(), options) {
+        Ok(document) => document,
+        Err(error) => {
+            problems.push(broken(text, &error));
+            return None;
+        }
+    };
+    let mut reader = Reader { text, problems };
     let root = document.root_element();
     if root.tag_name().name() != "AGMModel" {
-        return Err(unexpected(root, "`<AGMModel>`"));
+        reader.unexpected(root, "`<AGMModel>`");
+        return None;
     }
-    let (mut symbols, mut links) = (Vec::new(), Vec::new());
-    for element in root.children().filter(Node::is_element) {
-        match element.tag_name().name() {
-            "symbol" => symbols.push((element, symbol(element)?)),
-            "link" => links.push(element),
-            _ => return Err(unexpected(element, "`<symbol>` or `<link>`")),
+    Some(reader.world(root))
+}
+
+/// What roxmltree says, at the place where it says it.
+fn broken(text: &Text<'_>, error: &roxmltree::Error) -> Problem {
+    let place = error.pos();
+    let body = text.body();
+    let lines = body
+        .split_inclusive('\n')
+        .take(place.row.saturating_sub(1) as usize);
+    let start: usize = lines.map(str::len).sum();
+    let rest = body.get(start..).unwrap_or_default();
+    let column = place.col.saturating_sub(1) as usize;
+    let at = rest
+        .char_indices()
+        .nth(column)
+        .map_or(rest.len(), |(at, _)| at);
+    let byte = (start + at).min(body.len());
+    let len = body[byte..].chars().next().map_or(0, char::len_utf8);
+    let message = error.to_string();
+    let end = message.rfind(" at ").unwrap_or(message.len());
+    text.problem(text.span_in_body(&(byte..byte + len)), &message[..end])
+}
+
+impl Reader<'_, '_> {
+    fn world(&mut self, root: Node<'_, '_>) -> World {
+        let mut world = World::new(Format::Agm);
+        let (mut symbols, mut links) = (Vec::new(), Vec::new());
+        for element in root.children().filter(Node::is_element) {
+            match element.tag_name().name() {
+                "symbol" => symbols.push(element),
+                "link" => links.push(element),
+                _ => self.unexpected(element, "`<symbol>` or `<link>`"),
+            }
         }
-    }
-    let wanted: Vec<(String, Option<String>)> = symbols
-        .iter()
-        .map(|(_, s)| {
-            (
-                s.id.to_owned(),
-                s.attributes.get("imName").map(|&name| name.to_owned()),
-            )
-        })
-        .collect();
-    let mut known: BTreeMap<&str, Known> = BTreeMap::new();
-    // Ids that the store chooses come after those that the file gives, so that they do not meet.
-    let (mut numbered, mut others) = (Transaction::new(), Vec::new());
-    for ((element, symbol), name) in symbols.iter().zip(unique_names(&wanted)) {
-        let id = number(symbol.id).map(NodeId);
-        let entry = Known {
-            name: name.clone(),
-            id,
+        let mut read = Vec::new();
+        for element in symbols {
+            let (id, kind) = (self.said(element, "id"), self.said(element, "type"));
+            let attributes = self.attributes(element, "attribute", "`<attribute>`");
+            if let (Some(id), Some(kind)) = (id, kind) {
+                read.push((id, kind, attributes));
+            }
+        }
+        let name_of = |attributes: &[WorldAttribute]| {
+            let name = attributes.iter().find(|a| a.name.text == "imName");
+            name.map(|name| name.value.as_str().unwrap_or_default().to_owned())
         };
-        if known.insert(symbol.id, entry).is_some() {
-            let (line, column) = place(*element);
-            return Err(AgmError::Duplicate {
-                line,
-                column,
-                id: symbol.id.to_owned(),
+        let wanted: Vec<(String, Option<String>)> = read
+            .iter()
+            .map(|(id, _, attributes)| (id.text.clone(), name_of(attributes)))
+            .collect();
+        let mut known: BTreeMap<String, NodeRef> = BTreeMap::new();
+        for ((id, type_name, attributes), name) in read.into_iter().zip(unique_names(&wanted)) {
+            let number = number(&id.text).map(NodeId);
+            let reference = number.map_or_else(|| NodeRef::Name(name.clone()), NodeRef::Id);
+            if known.insert(id.text.clone(), reference).is_some() {
+                self.problem(id.span, format!("there is a symbol `{}` already", id.text));
+                continue;
+            }
+            world.nodes.push(WorldNode {
+                id: number.map(|number| (number, id.span.clone())),
+                type_name,
+                name: Word {
+                    text: name,
+                    span: id.span,
+                },
+                attributes,
             });
         }
-        let node = Operation::CreateNode {
-            id,
-            type_name: symbol.type_name.to_owned(),
-            name,
-            attributes: values(&symbol.attributes),
-        };
-        match id {
-            Some(_) => numbered.push(node),
-            None => others.push(node),
+        for element in links {
+            let edge = self.link(element, &known);
+            world.edges.extend(edge);
+        }
+        world
+    }
+
+    fn link(
+        &mut self,
+        element: Node<'_, '_>,
+        known: &BTreeMap<String, NodeRef>,
+    ) -> Option<WorldEdge> {
+        let label = self.said(element, "label");
+        let ends = ["src", "dst"].map(|name| self.said(element, name));
+        let mut attributes = self.attributes(element, "linkAttribute", "`<linkAttribute>`");
+        let label = label?;
+        let [from, to] = ends.map(|end| {
+            let id = end?;
+            let Some(found) = known.get(&id.text) else {
+                let message = format!(
+                    "there is no symbol `{}` for the link `{}`",
+                    id.text, label.text
+                );
+                self.problem(id.span, message);
+                return None;
+            };
+            Some((found.clone(), id.span))
+        });
+        let given = attributes.iter().any(|a| a.name.text == "enabled");
+        if let Some(enabled) = element.attribute_node("enabled").filter(|_| !given) {
+            let span = self.shift(enabled.range_value());
+            attributes.push(attribute(
+                Word {
+                    text: "enabled".to_owned(),
+                    span: self.shift(enabled.range_qname()),
+                },
+                Word {
+                    text: enabled.value().to_owned(),
+                    span,
+                },
+            ));
+        }
+        Some(WorldEdge {
+            from: from?,
+            label,
+            to: to?,
+            attributes,
+        })
+    }
+
+    /// The attributes below a symbol or link; of one that is given twice the last.
+    fn attributes(
+        &mut self,
+        element: Node<'_, '_>,
+        tag: &str,
+        expected: &str,
+    ) -> Vec<WorldAttribute> {
+        let mut attributes: Vec<WorldAttribute> = Vec::new();
+        for inner in element.children().filter(Node::is_element) {
+            if inner.tag_name().name() != tag {
+                self.unexpected(inner, expected);
+                continue;
+            }
+            let (key, value) = (self.said(inner, "key"), self.said(inner, "value"));
+            if let (Some(key), Some(value)) = (key, value) {
+                attributes.retain(|known| known.name.text != key.text);
+                attributes.push(attribute(key, value));
+            }
+        }
+        attributes
+    }
+
+    fn said(&mut self, element: Node<'_, '_>, name: &str) -> Option<Word> {
+        match element.attribute_node(name) {
+            Some(found) => Some(Word {
+                text: found.value().to_owned(),
+                span: self.shift(found.range_value()),
+            }),
+            None => {
+                let message = format!("`<{}>` has no `{name}`", element.tag_name().name());
+                self.problem(self.tag(element), message);
+                None
+            }
         }
     }
-    let mut transaction = numbered;
-    transaction.operations.extend(others);
-    for element in links {
-        transaction.push(link(element, &known)?);
+
+    fn unexpected(&mut self, element: Node<'_, '_>, expected: &str) {
+        let found = element.tag_name().name();
+        self.problem(
+            self.tag(element),
+            format!("expected {expected}, found `<{found}>`"),
+        );
     }
-    Ok(transaction)
+
+    fn problem(&mut self, span: Span, message: impl Into<String>) {
+        self.problems.push(self.text.problem(span, message));
+    }
+
+    fn shift(&self, span: Span) -> Span {
+        self.text.span_in_body(&span)
+    }
+
+    /// An element's opening bracket and name.
+    fn tag(&self, element: Node<'_, '_>) -> Span {
+        let start = element.range().start;
+        self.shift(start..start + 1 + element.tag_name().name().len())
+    }
+}
+
+fn attribute(name: Word, value: Word) -> WorldAttribute {
+    WorldAttribute {
+        name,
+        value: value.text.into(),
+        span: value.span,
+        time: None,
+        agent: None,
+    }
 }
 
 /// The number that an id is, if writing the number gives the id again: `07` is a text.
@@ -145,95 +228,4 @@ fn number(id: &str) -> Option<u64> {
     id.parse::<u64>()
         .ok()
         .filter(|number| number.to_string() == id)
-}
-
-fn values(attributes: &BTreeMap<&str, &str>) -> Vec<(String, Value)> {
-    attributes
-        .iter()
-        .map(|(&key, &value)| (key.to_owned(), value.into()))
-        .collect()
-}
-
-fn place(element: Node<'_, '_>) -> (u32, u32) {
-    let place = element.document().text_pos_at(element.range().start);
-    (place.row, place.col)
-}
-
-fn unexpected(element: Node<'_, '_>, expected: &'static str) -> AgmError {
-    let (line, column) = place(element);
-    AgmError::Element {
-        line,
-        column,
-        expected,
-        found: element.tag_name().name().to_owned(),
-    }
-}
-
-fn said<'a>(element: Node<'a, '_>, attribute: &'static str) -> Result<&'a str, AgmError> {
-    element.attribute(attribute).ok_or_else(|| {
-        let (line, column) = place(element);
-        let element = element.tag_name().name().to_owned();
-        AgmError::Missing {
-            line,
-            column,
-            element,
-            attribute,
-        }
-    })
-}
-
-/// The attributes below a symbol or link.
-fn attributes<'a>(
-    element: Node<'a, '_>,
-    tag: &str,
-    expected: &'static str,
-) -> Result<BTreeMap<&'a str, &'a str>, AgmError> {
-    let mut attributes = BTreeMap::new();
-    for inner in element.children().filter(Node::is_element) {
-        if inner.tag_name().name() != tag {
-            return Err(unexpected(inner, expected));
-        }
-        attributes.insert(said(inner, "key")?, said(inner, "value")?);
-    }
-    Ok(attributes)
-}
-
-fn symbol<'a>(element: Node<'a, '_>) -> Result<Symbol<'a>, AgmError> {
-    Ok(Symbol {
-        id: said(element, "id")?,
-        type_name: said(element, "type")?,
-        attributes: attributes(element, "attribute", "`<attribute>`")?,
-    })
-}
-
-fn link(element: Node<'_, '_>, known: &BTreeMap<&str, Known>) -> Result<Operation, AgmError> {
-    let label = said(element, "label")?;
-    let end = |attribute| -> Result<NodeRef, AgmError> {
-        let id = said(element, attribute)?;
-        let found = known.get(id).ok_or_else(|| {
-            let (line, column) = place(element);
-            AgmError::NoSuchSymbol {
-                line,
-                column,
-                label: label.to_owned(),
-                id: id.to_owned(),
-            }
-        })?;
-        Ok(found
-            .id
-            .map_or_else(|| NodeRef::Name(found.name.clone()), NodeRef::Id))
-    };
-    let edge = EdgeRef {
-        from: end("src")?,
-        label: label.to_owned(),
-        to: end("dst")?,
-    };
-    let mut attributes = attributes(element, "linkAttribute", "`<linkAttribute>`")?;
-    if let Some(enabled) = element.attribute("enabled") {
-        attributes.entry("enabled").or_insert(enabled);
-    }
-    Ok(Operation::CreateEdge {
-        edge,
-        attributes: values(&attributes),
-    })
 }

@@ -1,72 +1,31 @@
-//! Worlds of other systems: which format a text is in, and the transaction that makes, on an empty
-//! graph with an open schema, what it says. Guarantees that nothing of a file is dropped in silence
-//! but what [`read`] names, and that no text, however broken, makes it panic.
+//! Worlds in files: graph JSON (see [`crate::json`]), RoboComp DSR JSON and AGM models in XML come
+//! in, graph JSON, RoboComp DSR JSON, Graphviz DOT and GraphML go out. Guarantees that nothing of a
+//! file is dropped in silence, that every problem has its place in the text, and that no text, however
+//! broken, makes it panic.
 
 mod agm;
+mod check;
+mod dot;
+mod graph_json;
+mod graphml;
+mod place;
+mod problem;
 mod robocomp;
+mod world;
+mod write;
 
-pub use agm::AgmError;
-pub use robocomp::RobocompError;
+pub use check::check_graph;
+pub use dot::to_dot;
+pub use graphml::to_graphml;
+pub use problem::{InterchangeError, Problem, Problems, Severity};
+pub use world::{Format, LeftOut, Stamp, World};
+pub use write::to_robocomp;
 
-use crate::{Transaction, json};
+use crate::Schema;
+use place::Text;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::collections::BTreeMap;
-use std::fmt;
-use thiserror::Error;
-
-/// Why a world cannot be read.
-#[derive(Debug, Error)]
-pub enum InterchangeError {
-    /// Graph JSON, or text of no known format.
-    #[error(transparent)]
-    Json(#[from] json::JsonError),
-    /// RoboComp DSR JSON.
-    #[error(transparent)]
-    Robocomp(#[from] RobocompError),
-    /// AGM model XML.
-    #[error(transparent)]
-    Agm(#[from] AgmError),
-}
-
-/// What a text says of a world.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Import {
-    /// Makes the world on an empty graph with an open schema.
-    pub transaction: Transaction,
-    /// What could not be kept.
-    pub left_out: Vec<LeftOut>,
-}
-
-/// A link of a RoboComp file to a symbol that the file does not have.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct LeftOut {
-    /// The link's label.
-    pub label: String,
-    /// The id of the symbol where it starts.
-    pub from: u64,
-    /// The id that no symbol has.
-    pub to: u64,
-}
-
-impl From<Transaction> for Import {
-    fn from(transaction: Transaction) -> Self {
-        Self {
-            transaction,
-            left_out: Vec::new(),
-        }
-    }
-}
-
-impl fmt::Display for LeftOut {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { label, from, to } = self;
-        write!(
-            f,
-            "the link `{label}` of symbol {from} is left out: there is no symbol {to}"
-        )
-    }
-}
 
 /// What tells the JSON formats from each other.
 #[derive(Deserialize)]
@@ -75,36 +34,57 @@ struct Probe {
     dsr_model: Option<IgnoredAny>,
 }
 
-/// The world that a text says: graph JSON (see [`crate::json`]), RoboComp DSR JSON or AGM model XML. A byte-order mark may come
-/// first.
+/// The world that a text says: graph JSON, RoboComp DSR JSON or AGM model XML. A byte-order mark may
+/// come first, and anything may follow the closing brace of a RoboComp file. `schema` says of which
+/// kind the plain numbers of graph JSON are; [`Schema::open`] where there is none.
 ///
-/// Of RoboComp's files, time stamps and agent ids of attributes are dropped, and what follows the
-/// closing brace; a node's id, type, name, attributes and links are kept as they are.
+/// Names that the schema does not have are no errors here: see [`World::check`].
 ///
 /// # Errors
-/// [`InterchangeError`], with the place.
+/// [`InterchangeError`], with the places.
 ///
 /// # Example
 /// ```
+/// use dsr::{Graph, Schema, Time, interchange};
+///
 /// let xml = r#"<AGMModel>
 ///     <link src="1" dst="2" label="in"/>
 ///     <symbol id="1" type="robot"/>
 ///     <symbol id="2" type="room"><attribute key="imName" value="kitchen"/></symbol>
 /// </AGMModel>"#;
-/// let mut graph = dsr::Graph::in_memory(dsr::Schema::open());
-/// graph.commit(&dsr::interchange::read(xml)?.transaction, "me", dsr::Time::default())?;
+/// let mut graph = Graph::in_memory(Schema::open());
+/// graph.import(&interchange::read(xml, &Schema::open())?, "me", Time::default())?;
 /// assert!(graph.snapshot().find_node_by_name("kitchen")?.is_some());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn read(text: &str) -> Result<Import, InterchangeError> {
-    let text = text.trim_start_matches('\u{feff}');
-    if text.trim_start().starts_with('<') {
-        return Ok(agm::read(text)?.into());
+pub fn read(text: &str, schema: &Schema) -> Result<World, InterchangeError> {
+    let text = Text::new(text);
+    let mut problems = Vec::new();
+    let body = text.body();
+    let world = if body.trim_start().starts_with('<') {
+        agm::read(&text, &mut problems)
+    } else if is_robocomp(body) {
+        robocomp::read(&text, &mut problems)
+    } else {
+        graph_json::read(&text, schema, &mut problems)
+    };
+    if let Some(world) = &world {
+        world.check_references(&text, &mut problems);
     }
-    let mut values = serde_json::Deserializer::from_str(text).into_iter::<Probe>();
+    match world {
+        Some(world) if problems.is_empty() => Ok(world),
+        _ => Err(InterchangeError::new(problems)),
+    }
+}
+
+fn is_robocomp(body: &str) -> bool {
+    let mut values = serde_json::Deserializer::from_str(body).into_iter::<Probe>();
     match values.next() {
-        Some(Ok(Probe { dsr_model: Some(_) })) => Ok(robocomp::read(text)?),
-        _ => Ok(json::from_json(text)?.into()),
+        Some(Ok(probe)) => probe.dsr_model.is_some(),
+        // Broken: whose error it is, the first name tells.
+        _ => body
+            .trim_start_matches(['{', ' ', '\n', '\r', '\t'])
+            .starts_with("\"DSRModel\""),
     }
 }
 

@@ -4,6 +4,7 @@
 use super::{Work, read, touch};
 use crate::arena::Address;
 use crate::arena::table::{AttributeRecord, Place, Stored, Table};
+use crate::interchange::Stamp;
 use crate::rights::Carrier;
 use crate::{AttributeId, NodeId, Owner, Refusal, Touch, TypeId, Value};
 
@@ -122,6 +123,24 @@ impl Work<'_> {
             self.retire_attribute(gone);
         }
         Ok(attribute)
+    }
+
+    /// Says of an attribute that this commit wrote when and by whom it was written.
+    pub(in crate::graph) fn stamp(&mut self, stamp: &Stamp) -> Result<(), Refusal> {
+        let Some(value) = self.value_of(&stamp.owner, &stamp.name)? else {
+            return Ok(());
+        };
+        let own = self.stamp;
+        if let Some(time) = stamp.time {
+            self.stamp.time = time.nanoseconds();
+        }
+        if let Some(agent) = &stamp.agent {
+            let writer = self.graph.writer_id(agent, &mut self.root);
+            self.stamp.writer = self.room(writer)?;
+        }
+        let written = self.change_attribute(&stamp.owner, &stamp.name, Some(&value));
+        self.stamp = own;
+        written
     }
 
     pub(super) fn change_attribute(

@@ -1,0 +1,38 @@
+//! `cortex graph`: the shared graph of a running instance, or of a file, for people and scripts.
+
+mod check;
+mod diff;
+mod export;
+mod history;
+mod import;
+mod path;
+mod read;
+mod source;
+mod transform;
+mod watch;
+mod write;
+
+pub(crate) use source::{attach, no_such, read_graph};
+
+use crate::cli::{Graph as Arguments, GraphAction};
+use crate::{Answer, Failure};
+
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
+    let source = &arguments.source;
+    match &arguments.action {
+        GraphAction::Show { what } => read::show(source, what.as_deref()),
+        GraphAction::Get { path } => read::get(source, path),
+        GraphAction::Set { path, value } => write::set(source, path, value),
+        GraphAction::Watch(watch) => watch::watch(source, watch),
+        GraphAction::History { path, limit } => history::history(source, path, *limit),
+        GraphAction::Export { format } => export::export(source, *format),
+        GraphAction::Import { from, replace } => import::import(source, from, *replace),
+        GraphAction::Diff { a, b } => diff::diff(source, a, b.as_deref()),
+        GraphAction::Check { schema } => check::check(source, schema.as_deref()),
+        GraphAction::Transform {
+            target,
+            source: node,
+            at,
+        } => transform::transform(source, target, node, *at),
+    }
+}
