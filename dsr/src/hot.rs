@@ -243,6 +243,14 @@ mod tests {
         assert_eq!(read.value, Value::U64(2));
     }
 
+    struct EndOnDrop<'a>(&'a AtomicBool);
+
+    impl Drop for EndOnDrop<'_> {
+        fn drop(&mut self) {
+            self.0.store(true, Ordering::Relaxed);
+        }
+    }
+
     #[test]
     fn no_value_is_read_in_halves_while_it_is_written() {
         let page = page();
@@ -263,19 +271,23 @@ mod tests {
                     }
                 }
             });
-            let mut last = -1;
-            for _ in 0..200_000 {
+            // Also where an assertion fails, or the writer would never end.
+            let _end = EndOnDrop(&ended);
+            let (mut last, mut reads) = (-1, 0);
+            while reads < 200_000 || last < 1_000 {
+                reads += 1;
                 let read = read(&page, EPOCH, key(1));
-                // The writer was stopped in the middle by the scheduler.
-                let Some(read) = read else { continue };
+                // The writer was stopped in the middle by the scheduler, or has not begun.
+                let Some(read) = read.filter(|read| read.time > 0) else {
+                    std::thread::yield_now();
+                    continue;
+                };
                 let place = read.value.as_pose().unwrap().translation.vector;
                 let numbers = [place.x, place.y, place.z].map(|number| number as i64);
                 assert_eq!(numbers, [read.time; 3]);
                 assert!(read.time >= last, "time ran back");
                 last = read.time;
             }
-            ended.store(true, Ordering::Relaxed);
-            assert!(last > 0);
         });
     }
 
