@@ -22,6 +22,8 @@ use std::time::{Duration, Instant};
 const PATIENCE: Duration = Duration::from_secs(2);
 /// How often it looks.
 const LOOK: Duration = Duration::from_millis(1);
+/// The mode of a service's description while it is being written; readable alone once it is whole.
+const BEING_MADE: u32 = 0o600;
 /// What iceoryx2 calls the file that it makes for everybody on the host to write to.
 const OPEN_FILE: &str = ".global_mgmt";
 
@@ -81,10 +83,33 @@ pub(super) fn one_at_a_time<T>(node: &IpcNode, open: impl FnOnce() -> T) -> T {
     let folder = node.config().global.root_path().to_string();
     // Without the gate it works too, but for bad luck.
     let gate = lock(Path::new(&folder)).ok().flatten();
-    if gate.is_none() {
+    if gate.is_some() {
+        remove_half_made(Path::new(&node.config().global.service_dir().to_string()));
+    } else {
         tracing::warn!("another process has held {folder} for {PATIENCE:?}; is it stopped?");
     }
     open()
+}
+
+/// Removes the descriptions of services whose maker was killed while it made them: iceoryx2 would wait
+/// for it in vain, in every process and for good. To be called inside the gate, where nobody else
+/// makes one. What cannot be removed shows when the service is opened.
+fn remove_half_made(services: &Path) {
+    let Ok(entries) = fs::read_dir(services) else {
+        return;
+    };
+    for entry in entries.flatten() {
+        let half_made = entry
+            .metadata()
+            .is_ok_and(|metadata| metadata.is_file() && metadata.mode() & 0o777 == BEING_MADE);
+        if half_made {
+            tracing::warn!(
+                "{} was left by a process that was killed",
+                entry.path().display()
+            );
+            drop(fs::remove_file(entry.path()));
+        }
+    }
 }
 
 fn node<S: Service>(config: &Config) -> Result<Node<S>, InstanceError> {
