@@ -171,3 +171,25 @@ fn seal(instance: &Instance) -> Result<bool, InstanceError> {
     }
     Ok(sealed)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::PermissionsExt;
+
+    #[test]
+    fn only_descriptions_that_were_never_finished_are_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str, mode: u32| {
+            let path = folder.path().join(name);
+            fs::write(&path, name).unwrap();
+            fs::set_permissions(&path, fs::Permissions::from_mode(mode)).unwrap();
+            path
+        };
+        let half_made = file("half.service", BEING_MADE);
+        let whole = file("whole.service", 0o400);
+        remove_half_made(folder.path());
+        assert!(!half_made.exists() && whole.exists());
+        remove_half_made(&folder.path().join("nowhere"));
+    }
+}
