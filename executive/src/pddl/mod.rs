@@ -207,7 +207,7 @@ fn written(definition: &Definition, predicate: usize, objects: &[u32]) -> String
 }
 
 /// A plan as the planning competitions write it: a step a line, the cost behind them. `names` are
-/// those of [`write`], for a plan over the rules of a grammar.
+/// those of [`write()`], for a plan over the rules of a grammar.
 pub fn plan_file(outcome: &Outcome, names: Option<&Written>) -> String {
     let mut text = String::new();
     for step in &outcome.steps {
