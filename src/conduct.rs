@@ -4,7 +4,7 @@
 
 use crate::progress::Progress;
 use crate::supervise::{Hold, Notice, Policy, Program, SuperviseError, Supervisor};
-use dsr::{Image, Instance, ReadError, Session, Snapshot, Subscriber, Tick, Time};
+use dsr::{Image, Instance, ReadError, Session, Subscriber, Tick, Time};
 use executive::{Mission, MissionStatus};
 use scenarios::process::{TICK, TRUTH, tick_time};
 use scenarios::{Scenario, Truth};
@@ -321,7 +321,7 @@ impl<'a> Conductor<'a> {
     }
 
     fn missions_are_over(&mut self, show: bool) -> Result<bool, ConductError> {
-        let missions = self.session.read(missions_with_steps)?;
+        let missions = self.session.read(executive::missions_with_steps)?;
         if show {
             let start = self.start;
             let now = self
@@ -366,7 +366,7 @@ impl<'a> Conductor<'a> {
 
     /// Takes the last of what there is to report, then ends the processes.
     fn finish(mut self) -> Result<Recording, ConductError> {
-        self.recording.missions = self.session.read(missions_with_steps)?;
+        self.recording.missions = self.session.read(executive::missions_with_steps)?;
         let members = std::iter::once(self.store).chain(self.agents.clone());
         let members: Vec<usize> = members.chain(std::iter::once(self.world)).collect();
         self.supervisor.stop();
@@ -392,13 +392,4 @@ impl<'a> Conductor<'a> {
             .collect();
         Ok(std::mem::take(&mut self.recording))
     }
-}
-
-/// The missions in the graph with their steps, by id.
-fn missions_with_steps(snapshot: &Snapshot) -> Result<Vec<Mission>, ReadError> {
-    let mut missions = executive::missions(snapshot)?;
-    for mission in &mut missions {
-        mission.steps = executive::steps(snapshot, mission.id)?;
-    }
-    Ok(missions)
 }

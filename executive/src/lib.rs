@@ -21,7 +21,7 @@ mod testing;
 
 pub use mission::{
     Config, Entry, Executive, Mission, MissionSpec, MissionStatus, MissionStep, Planner,
-    Preemption, Request, RulePlanner, StepStatus, missions, steps,
+    Preemption, Request, RulePlanner, StepStatus, missions, missions_with_steps, steps,
 };
 pub use plan::{Options, Outcome, Raised, Status, Step, plan};
 pub use search::{Answer, Effort, Limits, Reachability, StopReason, search};

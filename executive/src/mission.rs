@@ -12,7 +12,8 @@ mod spec;
 mod testing;
 
 pub use record::{
-    Mission, MissionStatus, Preemption, Request, Step as MissionStep, StepStatus, missions, steps,
+    Mission, MissionStatus, Preemption, Request, Step as MissionStep, StepStatus, missions,
+    missions_with_steps, steps,
 };
 pub use spec::{Config, Entry, MissionSpec, Planner, RulePlanner};
 

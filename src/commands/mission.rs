@@ -29,10 +29,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
 
 fn read(session: &mut Session) -> Result<(Snapshot, Vec<Mission>), Failure> {
     let snapshot = session.snapshot().map_err(Failure::internal)?;
-    let mut missions = executive::missions(&snapshot).map_err(Failure::internal)?;
-    for mission in &mut missions {
-        mission.steps = executive::steps(&snapshot, mission.id).map_err(Failure::internal)?;
-    }
+    let missions = executive::missions_with_steps(&snapshot).map_err(Failure::internal)?;
     Ok((snapshot, missions))
 }
 

@@ -297,6 +297,18 @@ pub fn missions(snapshot: &Snapshot) -> Result<Vec<Mission>, ReadError> {
     Ok(missions)
 }
 
+/// All missions with their steps, by ascending id.
+///
+/// # Errors
+/// [`ReadError`].
+pub fn missions_with_steps(snapshot: &Snapshot) -> Result<Vec<Mission>, ReadError> {
+    let mut missions = missions(snapshot)?;
+    for mission in &mut missions {
+        mission.steps = steps(snapshot, mission.id)?;
+    }
+    Ok(missions)
+}
+
 /// The steps of a mission, by ascending index. A status that nobody knows counts as dropped, a
 /// binding that cannot be read as empty.
 ///
