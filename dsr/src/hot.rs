@@ -74,7 +74,7 @@ impl Hot {
             .pages
             .iter()
             .filter_map(|page| read(page.words(), self.epoch, key));
-        found.max_by_key(|record| record.time)
+        found.max_by_key(|record| record.head.time)
     }
 }
 
@@ -207,7 +207,7 @@ mod tests {
         for (value, time) in [(Value::F64(1.5), 10), (Value::F64(2.5), 20)] {
             write(&page, index, EPOCH, (&value, time), &mut Vec::new());
             let read = read(&page, EPOCH, key(5)).unwrap();
-            assert_eq!((read.value, read.time), (value, time));
+            assert_eq!((read.value, read.head.time), (value, time));
         }
         assert_eq!(read(&page, EPOCH, key(6)), None);
         assert_eq!(read(&page, Epoch(4), key(5)), None, "another store's graph");
@@ -278,15 +278,15 @@ mod tests {
                 reads += 1;
                 let read = read(&page, EPOCH, key(1));
                 // The writer was stopped in the middle by the scheduler, or has not begun.
-                let Some(read) = read.filter(|read| read.time > 0) else {
+                let Some(read) = read.filter(|read| read.head.time > 0) else {
                     std::thread::yield_now();
                     continue;
                 };
                 let place = read.value.as_pose().unwrap().translation.vector;
                 let numbers = [place.x, place.y, place.z].map(|number| number as i64);
-                assert_eq!(numbers, [read.time; 3]);
-                assert!(read.time >= last, "time ran back");
-                last = read.time;
+                assert_eq!(numbers, [read.head.time; 3]);
+                assert!(read.head.time >= last, "time ran back");
+                last = read.head.time;
             }
         });
     }

@@ -183,11 +183,13 @@ impl Snapshot {
     ///
     /// # Errors
     /// [`ReadError::SnapshotTooOld`].
+    #[inline]
     pub fn check(&self) -> Result<(), ReadError> {
         self.arena.check(self.root.version, self.lease)
     }
 
     /// Turns the outcome of a walk through the arena into what the caller may see.
+    #[inline]
     pub(crate) fn genuine<T>(&self, outcome: Result<T, Address>) -> Result<T, ReadError> {
         match outcome {
             Ok(found) => self.check().map(|()| found),
@@ -195,19 +197,17 @@ impl Snapshot {
         }
     }
 
+    #[cold]
     pub(in crate::snapshot) fn broken(&self, address: Address) -> ReadError {
         self.arena.broken(self.root.version, self.lease, address)
     }
 
+    /// The node whose record begins with `words`; not yet known to be genuine.
     #[inline]
-    fn node_at(&self, address: Address) -> Result<Node<'_>, ReadError> {
-        let words = self.arena.from(address);
-        let record = words.and_then(|words| words.first_chunk::<{ record::NODE_HEADER }>());
-        let (Some([id, kind, ..]), Some(words)) = (record, words) else {
-            return Err(self.broken(address));
-        };
+    fn node_at<'a>(&'a self, address: Address, words: &'a [Word]) -> Result<Node<'a>, Address> {
+        let header = words.first_chunk::<{ record::NODE_HEADER }>();
+        let [id, kind, ..] = header.ok_or(address)?;
         let (id, type_id) = (NodeId(id.load()), TypeId(kind.load() as u16));
-        self.check()?;
         Ok(Node::at(self, address, words, id, type_id))
     }
 
@@ -217,9 +217,18 @@ impl Snapshot {
     /// [`ReadError`], as for every read of a snapshot.
     #[inline]
     pub fn find_node(&self, id: NodeId) -> Result<Option<Node<'_>>, ReadError> {
-        self.genuine(trie::find(&self.arena, self.root.nodes, id.0))?
-            .map(|address| self.node_at(address))
-            .transpose()
+        let found = match trie::find(&self.arena, self.root.nodes, id.0) {
+            Ok(Some((address, words))) => self.node_at(address, words),
+            Ok(None) => return self.check().map(|()| None),
+            Err(address) => Err(address),
+        };
+        match found {
+            Ok(node) => {
+                self.check()?;
+                Ok(Some(node))
+            }
+            Err(address) => Err(self.broken(address)),
+        }
     }
 
     /// The node of that name, if it is there.
@@ -247,8 +256,9 @@ impl Snapshot {
     pub fn nodes(&self) -> impl Iterator<Item = Result<Node<'_>, ReadError>> {
         let mut walk = Some(trie::Walk::new(self.root.nodes));
         std::iter::from_fn(move || {
-            let next = self.genuine(walk.as_mut()?.next(&self.arena));
-            let next = next.and_then(|address| address.map(|a| self.node_at(a)).transpose());
+            let next = walk.as_mut()?.next(&self.arena);
+            let node = |(address, words)| self.node_at(address, words);
+            let next = self.genuine(next.and_then(|found| found.map(node).transpose()));
             if !matches!(next, Ok(Some(_))) {
                 walk = None;
             }

@@ -14,9 +14,8 @@ pub(crate) mod table;
 pub(crate) mod tree;
 pub(crate) mod trie;
 
-use crate::shm::Segment;
+use crate::shm::{Segment, Segments};
 use crate::{Epoch, Time, Version};
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering, fence};
 use thiserror::Error;
 
@@ -229,7 +228,7 @@ impl Root {
 /// The arena as one process sees it.
 #[derive(Debug)]
 pub(crate) struct Arena {
-    segments: Box<[OnceLock<Segment>]>,
+    segments: Segments,
     /// log2 of the words in a segment.
     shift: u32,
 }
@@ -238,43 +237,36 @@ impl Arena {
     /// An arena of up to `capacity` segments of `2^shift` words, none of them there yet.
     pub(crate) fn new(capacity: usize, shift: u32) -> Self {
         Self {
-            segments: (0..capacity).map(|_| OnceLock::new()).collect(),
+            segments: Segments::new(capacity, 1 << shift),
             shift,
         }
     }
 
+    #[inline]
     pub(crate) fn segment_words(&self) -> usize {
         1 << self.shift
     }
 
     pub(crate) fn capacity(&self) -> usize {
-        self.segments.len()
+        self.segments.capacity()
     }
 
     /// Segments that are there.
     pub(crate) fn attached(&self) -> usize {
-        self.segments
-            .iter()
-            .take_while(|s| s.get().is_some())
-            .count()
+        let there = (0..self.capacity()).take_while(|&index| self.segments.get(index).is_some());
+        there.count()
     }
 
     /// Adds segment `index`; one that is there already stays.
     pub(crate) fn attach(&self, index: usize, segment: Segment) {
-        if let Some(slot) = self.segments.get(index)
-            && segment.words().len() >= self.segment_words()
-        {
-            slot.get_or_init(|| segment);
-        }
+        self.segments.add(index, segment);
     }
 
     /// The words from `address` to the end of its segment.
     #[inline]
     pub(crate) fn from(&self, address: Address) -> Option<&[Word]> {
-        let segment = self.segments.get((address >> self.shift) as usize)?.get()?;
-        segment
-            .words()
-            .get((address as usize) & (self.segment_words() - 1)..)
+        let segment = self.segments.get((address >> self.shift) as usize)?;
+        segment.get((address as usize) & (self.segment_words() - 1)..)
     }
 
     /// The `len` words at `address`.
@@ -282,8 +274,9 @@ impl Arena {
         self.from(address)?.get(..len)
     }
 
+    #[inline]
     fn header(&self, index: usize) -> Option<&Word> {
-        self.from(0)?.get(index)
+        self.segments.get(0)?.get(index)
     }
 
     /// Writes the header of an empty arena; the writer's first act.
@@ -347,6 +340,7 @@ impl Arena {
     }
 
     /// The oldest version that can still be read.
+    #[inline]
     pub(crate) fn oldest(&self) -> u64 {
         self.header(at::OLDEST).map_or(0, Word::load)
     }
@@ -449,7 +443,6 @@ impl Arena {
         fence(Ordering::Release);
     }
 
-    #[cold]
     fn lease_holds(&self, mark: LeaseMark) -> bool {
         let word = self.header(at::LEASES + mark.place);
         mark.place < LEASES && word.is_some_and(|word| word.load() == mark.token)
@@ -460,18 +453,26 @@ impl Arena {
     #[inline]
     pub(crate) fn check(&self, version: u64, lease: Option<LeaseMark>) -> Result<(), ReadError> {
         fence(Ordering::Acquire);
-        let oldest = self.oldest();
-        if version < oldest && !lease.is_some_and(|mark| self.lease_holds(mark)) {
-            return Err(ReadError::SnapshotTooOld {
-                version: Version(version),
-                oldest: Version(oldest),
-            });
+        if version >= self.oldest() {
+            return Ok(());
         }
-        Ok(())
+        self.check_lease(version, lease)
+    }
+
+    #[cold]
+    fn check_lease(&self, version: u64, lease: Option<LeaseMark>) -> Result<(), ReadError> {
+        if lease.is_some_and(|mark| self.lease_holds(mark)) {
+            return Ok(());
+        }
+        Err(ReadError::SnapshotTooOld {
+            version: Version(version),
+            oldest: Version(self.oldest()),
+        })
     }
 
     /// The error of a read that met something impossible at `address`: either the memory was
     /// reused under the reader, or it is damaged.
+    #[cold]
     pub(crate) fn broken(
         &self,
         version: u64,

@@ -234,9 +234,50 @@ pub(crate) enum Stored<'a> {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct AttributeRecord {
     pub(crate) value: Value,
+    pub(crate) head: Head,
+}
+
+/// What an attribute says of its value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Head {
+    /// The commit that wrote it.
     pub(crate) version: u64,
     pub(crate) time: i64,
     pub(crate) writer: u16,
+}
+
+/// A value that takes no memory of its own, still as words.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Small<'a> {
+    Number(f64),
+    Pose(&'a [Word; 7]),
+}
+
+/// The attribute at the beginning of `words`, where its value is of a kind that is read the most.
+#[inline]
+pub(crate) fn small_value(words: &[Word]) -> Option<(Head, Small<'_>)> {
+    const F64: u16 = ValueKind::F64 as u16;
+    const POSE: u16 = ValueKind::Pose as u16;
+    let (header, value) = words.split_first_chunk::<ATTRIBUTE_HEADER>()?;
+    let [first, version, time] = header.each_ref().map(Word::load);
+    let head = Head {
+        version,
+        time: time.cast_signed(),
+        writer: (first >> 16) as u16,
+    };
+    match first as u16 {
+        F64 => Some((head, Small::Number(f64::from_bits(value.first()?.load())))),
+        POSE => Some((head, Small::Pose(value.first_chunk()?))),
+        _ => None,
+    }
+}
+
+/// The pose of these words.
+#[inline]
+pub(crate) fn pose_of<W: Load>(words: &[W; 7]) -> Pose {
+    let [x, y, z, i, j, k, w] = words.each_ref().map(|word| f64::from_bits(word.get()));
+    let rotation = UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k));
+    Pose::from_parts(Translation3::new(x, y, z), rotation)
 }
 
 /// The count and address of a link to older records.
@@ -245,29 +286,31 @@ fn split_link(link: u64) -> (u16, Address) {
 }
 
 /// The words before the value of an attribute of that kind.
+#[inline]
 fn header_of(kind: u16) -> usize {
     ATTRIBUTE_HEADER + usize::from(kind & HAS_HISTORY != 0)
 }
 
 impl AttributeRecord {
     /// The attribute in a block of its own.
-    #[inline]
     pub(crate) fn read(arena: &Arena, address: Address) -> Result<Self, Address> {
         arena.from(address).and_then(Self::decode).ok_or(address)
     }
 
     /// The attribute at the beginning of `words`.
-    #[inline]
     pub(crate) fn decode<W: Load>(words: &[W]) -> Option<Self> {
         let header = words.first_chunk::<ATTRIBUTE_HEADER>()?;
-        let [head, version, time] = header.each_ref().map(Load::get);
-        let (kind, length) = (head as u16, (head >> 32) as usize);
+        let [first, version, time] = header.each_ref().map(Load::get);
+        let (kind, length) = (first as u16, (first >> 32) as usize);
         let value = words.get(header_of(kind)..)?;
-        Some(Self {
-            value: decode_value(kind & !HAS_HISTORY, length, value)?,
+        let head = Head {
             version,
             time: time.cast_signed(),
-            writer: (head >> 16) as u16,
+            writer: (first >> 16) as u16,
+        };
+        Some(Self {
+            value: decode_value(kind & !HAS_HISTORY, length, value)?,
+            head,
         })
     }
 
@@ -397,12 +440,7 @@ fn decode_value<W: Load>(kind: u16, length: usize, words: &[W]) -> Option<Value>
         ValueKind::F32List => Value::F32List(f32s(words, length)?),
         ValueKind::U8List => Value::U8List(unpack(words, length)?),
         ValueKind::U64List => Value::U64List(words.get(..length)?.iter().map(Load::get).collect()),
-        ValueKind::Pose => {
-            let row = words.first_chunk::<7>()?;
-            let [x, y, z, i, j, k, w] = row.each_ref().map(|word| f64::from_bits(word.get()));
-            let rotation = UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k));
-            Value::Pose(Pose::from_parts(Translation3::new(x, y, z), rotation))
-        }
+        ValueKind::Pose => Value::Pose(pose_of(words.first_chunk()?)),
     })
 }
 

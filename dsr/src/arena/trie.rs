@@ -19,8 +19,12 @@ pub(crate) type Link = u64;
 /// Bits of the id that a level goes by.
 const BITS: u64 = 5;
 const WIDTH: u64 = 1 << BITS;
+/// The bitmap of a block that has all its links.
+const FULL: u64 = (1 << WIDTH) - 1;
 /// No id has more groups of so many bits than this.
 const LEVELS: u64 = 64u64.div_ceil(BITS);
+/// Blocks and the record on the way to a node.
+const STEPS: u64 = LEVELS + 1;
 /// Bitmap and prefix.
 const HEADER: usize = 2;
 /// Words of the largest block.
@@ -59,12 +63,16 @@ fn level_of(link: Link) -> u64 {
     link >> 60
 }
 
-/// The record of node `id`; `Err` where the trie leads to an impossible place.
+/// The record of node `id` and the words from its first on; `Err` where the trie leads to an
+/// impossible place.
 #[inline]
-pub(crate) fn find(arena: &Arena, root: Link, id: u64) -> Result<Option<Address>, Address> {
+pub(crate) fn find(
+    arena: &Arena,
+    root: Link,
+    id: u64,
+) -> Result<Option<(Address, &[Word])>, Address> {
     let mut link = root;
-    // One block per level, then a record.
-    for _ in 0..=LEVELS {
+    for _ in 0..STEPS {
         if link == 0 {
             return Ok(None);
         }
@@ -72,18 +80,23 @@ pub(crate) fn find(arena: &Arena, root: Link, id: u64) -> Result<Option<Address>
         let words = arena.from(address).ok_or(address)?;
         let first = words.first().ok_or(address)?.load();
         if is_record(link) {
-            return Ok((first == id).then_some(address));
+            return Ok((first == id).then_some((address, words)));
         }
         let level = level_of(link);
         if level >= LEVELS {
             return Err(address);
         }
         let bit = slot(id, level);
-        if first & (1 << bit) == 0 {
+        // Ids that follow each other fill their blocks. There the link's place does not depend on
+        // the bitmap, so that the processor need not wait for that.
+        let at = if first == FULL {
+            bit as usize
+        } else if first & (1 << bit) == 0 {
             return Ok(None);
-        }
-        let at = HEADER + rank(first, bit);
-        link = words.get(at).ok_or(address)?.load();
+        } else {
+            rank(first, bit)
+        };
+        link = words.get(HEADER + at).ok_or(address)?.load();
     }
     Err(address_of(link))
 }
@@ -247,7 +260,10 @@ impl Walk {
     }
 
     /// The next record; `Err` where the trie leads to an impossible place.
-    pub(crate) fn next(&mut self, arena: &Arena) -> Result<Option<Address>, Address> {
+    pub(crate) fn next<'a>(
+        &mut self,
+        arena: &'a Arena,
+    ) -> Result<Option<(Address, &'a [Word])>, Address> {
         while let Some((link, above)) = self.stack.pop() {
             let address = address_of(link);
             let words = arena.from(address).ok_or(address)?;
@@ -257,7 +273,7 @@ impl Walk {
                     return Err(address);
                 }
                 self.last = Some(first);
-                return Ok(Some(address));
+                return Ok(Some((address, words)));
             }
             let level = level_of(link);
             if level >= above || first == 0 {
@@ -299,21 +315,27 @@ mod tests {
     #[test]
     fn a_block_that_leads_to_itself_ends_a_walk() {
         let link = to_block(BLOCK, 3);
-        assert_eq!(Walk::new(link).next(&arena(link)), Err(BLOCK));
+        let end = Walk::new(link).next(&arena(link)).map(|_| ());
+        assert_eq!(end, Err(BLOCK));
     }
 
     #[test]
     fn a_record_counts_once() {
         let arena = arena(to_record(RECORD));
         let mut walk = Walk::new(to_block(BLOCK, 0));
-        assert_eq!(walk.next(&arena), Ok(Some(RECORD)));
-        assert_eq!(walk.next(&arena), Err(RECORD));
+        let mut next = || {
+            walk.next(&arena)
+                .map(|found| found.map(|(address, _)| address))
+        };
+        assert_eq!(next(), Ok(Some(RECORD)));
+        assert_eq!(next(), Err(RECORD));
     }
 
     #[test]
     fn an_empty_block_is_damage() {
         let arena = arena(0);
         arena.block(BLOCK, 1).unwrap()[0].store(0);
-        assert_eq!(Walk::new(to_block(BLOCK, 0)).next(&arena), Err(BLOCK));
+        let end = Walk::new(to_block(BLOCK, 0)).next(&arena).map(|_| ());
+        assert_eq!(end, Err(BLOCK));
     }
 }

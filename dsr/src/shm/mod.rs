@@ -23,7 +23,7 @@ pub use changes::{Changes, Update};
 pub use channel::{Publisher, Subscriber};
 pub use hot::{HotAttribute, HotError};
 pub use lease::{Lease, LeaseError};
-pub(crate) use segment::Segment;
+pub(crate) use segment::{Segment, Segments};
 pub use session::{AttachError, ClockError, CommitError, Session, Tick};
 pub use store::{Store, StoreError};
 

@@ -2,12 +2,13 @@
 //! that the words stay where they are for as long as the segment lives.
 //!
 //! Every read of the graph goes through here, so a segment is a pointer and a length, not an
-//! object that has to be asked.
+//! object that has to be asked, and an arena's are found by one load.
 
 use crate::arena::Word;
 use std::any::Any;
 use std::fmt;
-use std::sync::Arc;
+use std::sync::atomic::{AtomicPtr, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// A part of the arena in one piece.
 pub(crate) struct Segment {
@@ -64,6 +65,67 @@ impl fmt::Debug for Segment {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Segment")
             .field("words", &self.len)
+            .finish_non_exhaustive()
+    }
+}
+
+/// The segments of an arena, all of one size. One that was added stays for as long as they live.
+pub(crate) struct Segments {
+    /// Where each begins; null for one that is not there.
+    starts: Box<[AtomicPtr<Word>]>,
+    /// Words of each.
+    words: usize,
+    /// Keep the memory.
+    owners: Mutex<Vec<Segment>>,
+}
+
+impl Segments {
+    /// Room for `capacity` segments of `words` words.
+    pub(crate) fn new(capacity: usize, words: usize) -> Self {
+        Self {
+            starts: (0..capacity).map(|_| AtomicPtr::default()).collect(),
+            words,
+            owners: Mutex::default(),
+        }
+    }
+
+    /// How many there can be.
+    pub(crate) fn capacity(&self) -> usize {
+        self.starts.len()
+    }
+
+    /// Adds segment `index`. One that is there already stays; one that is too small is not added.
+    pub(crate) fn add(&self, index: usize, segment: Segment) {
+        let Some(start) = self.starts.get(index) else {
+            return;
+        };
+        let mut owners = self.owners.lock().unwrap_or_else(PoisonError::into_inner);
+        // Whoever adds one holds the lock.
+        if start.load(Ordering::Relaxed).is_null() && segment.len >= self.words {
+            start.store(segment.start.cast_mut(), Ordering::Release);
+            owners.push(segment);
+        }
+    }
+
+    /// The words of segment `index`, if it is there.
+    #[inline]
+    pub(crate) fn get(&self, index: usize) -> Option<&[Word]> {
+        let start = self.starts.get(index)?.load(Ordering::Acquire);
+        if start.is_null() {
+            return None;
+        }
+        // SAFETY: `start` is where a segment in `owners` begins that has at least so many words. It
+        // is never taken out, and what it promises holds until it is dropped with `self`.
+        Some(unsafe { std::slice::from_raw_parts(start, self.words) })
+    }
+}
+
+impl fmt::Debug for Segments {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let there = (0..self.capacity()).take_while(|&index| self.get(index).is_some());
+        f.debug_struct("Segments")
+            .field("words", &self.words)
+            .field("there", &there.count())
             .finish_non_exhaustive()
     }
 }

@@ -3,7 +3,7 @@
 
 use super::{NodeIds, Scan, Snapshot};
 use crate::arena::record;
-use crate::arena::table::{self, AttributeRecord, Place};
+use crate::arena::table::{self, AttributeRecord, Head, Place, Small};
 use crate::arena::{Address, ReadError, Word};
 use crate::hot::Key;
 use crate::{AttributeId, EdgeKey, LabelId, NodeId, Time, TypeId, Value, Version, WriterId};
@@ -16,11 +16,11 @@ pub struct Element<'a> {
     address: Address,
     /// Of its record.
     words: &'a [Word],
-    layout: Layout,
+    layout: &'static Layout,
 }
 
 /// Where a record has what.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 struct Layout {
     /// The word with the number of attributes.
     kind: usize,
@@ -28,12 +28,12 @@ struct Layout {
     attributes: usize,
 }
 
-const NODE: Layout = Layout {
+static NODE: Layout = Layout {
     kind: 1,
     version: 3,
     attributes: record::NODE_HEADER,
 };
-const EDGE: Layout = Layout {
+static EDGE: Layout = Layout {
     kind: 2,
     version: 3,
     attributes: record::EDGE_HEADER,
@@ -84,6 +84,7 @@ pub struct Attribute {
 }
 
 impl<'a> Element<'a> {
+    #[inline]
     pub(super) fn word(&self, index: usize) -> Result<u64, ReadError> {
         let word = self.words.get(index).map(Word::load);
         self.snapshot.genuine(word.ok_or(self.address))
@@ -105,15 +106,9 @@ impl<'a> Element<'a> {
         Some((table, table.get(..table::count(kind))?))
     }
 
-    #[inline]
-    fn decode(&self, table: &[Word], row: u64) -> Result<AttributeRecord, Address> {
-        match table::place_of(row) {
-            Place::InTable(offset) => table
-                .get(offset..)
-                .and_then(AttributeRecord::decode)
-                .ok_or(self.address),
-            Place::At(address) => AttributeRecord::read(&self.snapshot.arena, address),
-        }
+    fn decode(&self, table: &'a [Word], row: u64) -> Result<AttributeRecord, Address> {
+        let words = self.words_of(table, row)?;
+        AttributeRecord::decode(words).ok_or(self.address)
     }
 
     /// One attribute, if it is there. Where its owner gives out a newer value beside the graph (see
@@ -124,31 +119,75 @@ impl<'a> Element<'a> {
     /// [`ReadError`].
     #[inline]
     pub fn attribute(&self, name: AttributeId) -> Result<Option<Attribute>, ReadError> {
-        let (table, rows) = self
-            .table()
-            .ok_or_else(|| self.snapshot.broken(self.address))?;
-        let row = rows
-            .iter()
-            .map(Word::load)
-            .find(|&row| table::name_of(row) == name.0);
-        let record = row.map(|row| self.decode(table, row)).transpose();
-        let record = self.snapshot.genuine(record)?;
-        Ok(record.map(|record| written(name, self.newest(name, record))))
+        let words = match self.find(name) {
+            Ok(Some(words)) => words,
+            Ok(None) => return self.snapshot.check().map(|()| None),
+            Err(address) => return Err(self.snapshot.broken(address)),
+        };
+        // Numbers and poses are made here, so that they are written once, where they are wanted.
+        match table::small_value(words) {
+            Some((head, Small::Number(number))) if !self.is_hot(name) => {
+                self.snapshot.check()?;
+                Ok(Some(written(name, head, Value::F64(number))))
+            }
+            Some((head, Small::Pose(row))) if !self.is_hot(name) => {
+                self.snapshot.check()?;
+                let pose = table::pose_of(row);
+                Ok(Some(written(name, head, Value::Pose(pose))))
+            }
+            _ => self.other_attribute(name, words),
+        }
+    }
+
+    /// Where the attribute lies; not yet known to be genuine.
+    #[inline]
+    fn find(&self, name: AttributeId) -> Result<Option<&'a [Word]>, Address> {
+        let (table, rows) = self.table().ok_or(self.address)?;
+        let mut rows = rows.iter().map(Word::load);
+        match rows.find(|&row| table::name_of(row) == name.0) {
+            Some(row) => self.words_of(table, row).map(Some),
+            None => Ok(None),
+        }
+    }
+
+    /// The words of a row's attribute.
+    #[inline]
+    fn words_of(&self, table: &'a [Word], row: u64) -> Result<&'a [Word], Address> {
+        match table::place_of(row) {
+            Place::InTable(offset) => table.get(offset..).ok_or(self.address),
+            Place::At(address) => self.snapshot.arena.from(address).ok_or(address),
+        }
+    }
+
+    /// Whether there may be a newer value beside the graph.
+    #[inline]
+    fn is_hot(&self, name: AttributeId) -> bool {
+        let pages = self.snapshot.hot.as_ref().map(|hot| hot.pages.is_empty());
+        pages == Some(false) && self.snapshot.schema.hot_rate(name).is_some()
+    }
+
+    #[inline(never)]
+    fn other_attribute(
+        &self,
+        name: AttributeId,
+        words: &[Word],
+    ) -> Result<Option<Attribute>, ReadError> {
+        let record = AttributeRecord::decode(words).ok_or(self.address);
+        let committed = self.snapshot.genuine(record)?;
+        Ok(Some(self.newest(name, committed)))
     }
 
     /// What its owner gives out of a hot attribute takes the place of what was committed before.
-    #[inline]
-    fn newest(&self, name: AttributeId, committed: AttributeRecord) -> AttributeRecord {
-        let hot = self.snapshot.hot.as_ref();
-        let hot = hot.filter(|_| self.snapshot.schema.hot_rate(name).is_some());
+    fn newest(&self, name: AttributeId, committed: AttributeRecord) -> Attribute {
+        let hot = self.snapshot.hot.as_ref().filter(|_| self.is_hot(name));
         let found = hot.and_then(|hot| hot.read(self.key_of(name)?));
+        let head = committed.head;
         match found {
-            Some(hot) if hot.time > committed.time => AttributeRecord {
-                value: hot.value,
-                time: hot.time,
-                ..committed
-            },
-            _ => committed,
+            Some(hot) if hot.head.time > head.time => {
+                let time = hot.head.time;
+                written(name, Head { time, ..head }, hot.value)
+            }
+            _ => written(name, head, committed.value),
         }
     }
 
@@ -186,14 +225,14 @@ impl<'a> Element<'a> {
 
     fn append_history(
         &self,
-        table: &[Word],
+        table: &'a [Word],
         row: u64,
         history: &mut Vec<Attribute>,
     ) -> Result<(), ReadError> {
         let name = AttributeId(table::name_of(row));
         let mut append = |row| {
             let record = self.snapshot.genuine(self.decode(table, row))?;
-            history.push(written(name, record));
+            history.push(written(name, record.head, record.value));
             Ok::<_, ReadError>(())
         };
         append(row)?;
@@ -251,23 +290,25 @@ impl<'a> Element<'a> {
                 let row = row.load();
                 let record = self.snapshot.genuine(self.decode(table, row))?;
                 let name = AttributeId(table::name_of(row));
-                Ok(written(name, self.newest(name, record)))
+                Ok(self.newest(name, record))
             })
             .collect()
     }
 }
 
-fn written(name: AttributeId, record: AttributeRecord) -> Attribute {
+#[inline]
+fn written(name: AttributeId, head: Head, value: Value) -> Attribute {
     Attribute {
         name,
-        value: record.value,
-        version: Version(record.version),
-        time: Time::from_nanoseconds(record.time),
-        writer: WriterId(record.writer),
+        value,
+        version: Version(head.version),
+        time: Time::from_nanoseconds(head.time),
+        writer: WriterId(head.writer),
     }
 }
 
 impl<'a> Node<'a> {
+    #[inline]
     pub(super) fn at(
         snapshot: &'a Snapshot,
         address: Address,
@@ -279,7 +320,7 @@ impl<'a> Node<'a> {
             snapshot,
             address,
             words,
-            layout: NODE,
+            layout: &NODE,
         };
         Self {
             element,
@@ -405,13 +446,14 @@ impl<'a> Node<'a> {
 }
 
 impl<'a> Edge<'a> {
+    #[inline]
     pub(super) fn at(snapshot: &'a Snapshot, address: Address, key: EdgeKey) -> Self {
         let element = Element {
             snapshot,
             address,
             // A place outside the arena is told by the first read.
             words: snapshot.arena.from(address).unwrap_or(&[]),
-            layout: EDGE,
+            layout: &EDGE,
         };
         Self { element, key }
     }

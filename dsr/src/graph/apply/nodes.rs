@@ -32,7 +32,7 @@ impl Work<'_> {
                 .ok_or_else(|| Refusal::NotFound(node.to_string()))?,
         };
         let arena = &self.graph.writer.arena;
-        let address = read(trie::find(arena, self.root.nodes, id.0))?
+        let (address, _) = read(trie::find(arena, self.root.nodes, id.0))?
             .ok_or_else(|| Refusal::NotFound(node.to_string()))?;
         Ok((address, read(NodeRecord::read(arena, address))?))
     }
