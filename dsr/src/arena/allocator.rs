@@ -394,4 +394,16 @@ mod tests {
             assert!(allocator.fresh.capacity() <= 2 * USUAL);
         }
     }
+
+    /// An arena that was formatted after it had grown once said that it had one segment, and readers
+    /// went on without the others.
+    #[test]
+    fn an_arena_that_shows_itself_tells_of_all_its_segments() {
+        let arena = Arena::new(4, 17);
+        let mut growth = HeapGrowth;
+        growth.grow(&arena, 0).unwrap();
+        growth.grow(&arena, 1).unwrap();
+        arena.format(crate::Epoch(1));
+        assert_eq!(arena.announced_segments(), 2);
+    }
 }

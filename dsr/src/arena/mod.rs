@@ -288,7 +288,7 @@ impl Arena {
         };
         put(at::FORMAT, FORMAT);
         put(at::EPOCH, epoch.0);
-        put(at::SEGMENTS, 1);
+        put(at::SEGMENTS, self.attached() as u64);
         // Version 0, the empty graph, is the root of zeros that the ring holds already.
         if let Some(word) = self.header(at::MAGIC) {
             word.store_release(MAGIC);

@@ -218,8 +218,13 @@ impl ArenaSubscriber {
         })
     }
 
-    /// The newest store's arena as far as it has arrived.
-    pub(crate) fn poll(&mut self) -> Result<Option<(Epoch, Arc<Arena>)>, InstanceError> {
+    /// The newest store's arena as far as it has arrived at the last [`Self::poll`].
+    pub(super) fn newest(&self) -> Option<(Epoch, Arc<Arena>)> {
+        self.arena.clone()
+    }
+
+    /// Takes what has arrived.
+    pub(crate) fn poll(&mut self) -> Result<(), InstanceError> {
         while let Some(sample) = self.subscriber.receive().map_err(|e| ipc("the arena", e))? {
             let header = *sample.user_header();
             let known = self.arena.as_ref().map(|(epoch, _)| epoch.0);
@@ -243,6 +248,6 @@ impl ArenaSubscriber {
                 self.early.push(sample);
             }
         }
-        Ok(self.arena.clone())
+        Ok(())
     }
 }

@@ -3,24 +3,14 @@
 //! its page was written so.
 
 use super::arena::Current;
-use super::{
-    InstanceError, Ipc, IpcNode, MAX_PROCESSES, Segment, ipc, now, one_at_a_time, service_name,
-};
+use super::page::{OwnPage, Pages};
+use super::{InstanceError, IpcNode, Segment};
 use crate::arena::Word;
-use crate::hot::{self, Key, PAGE_WORDS};
+use crate::hot::{self, PAGE_WORDS};
 use crate::value::hash;
 use crate::{AttributeId, Epoch, Owner, SchemaError, Time, Transaction, Value};
-use iceoryx2::port::publisher::Publisher as IpcPublisher;
-use iceoryx2::port::subscriber::Subscriber as IpcSubscriber;
-use iceoryx2::port::update_connections::UpdateConnections;
-use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
-use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
-use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::sync::Arc;
 use thiserror::Error;
-
-/// How often an owner looks for sessions that joined.
-const NEWCOMERS: Duration = Duration::from_millis(10);
 
 /// Why an attribute cannot be written hot.
 #[derive(Debug, Error)]
@@ -56,87 +46,12 @@ impl From<InstanceError> for HotError {
     }
 }
 
-type Factory = PortFactory<Ipc, [Word], ()>;
+const HOT: &str = "graph/hot";
 
-fn service(node: &IpcNode) -> Result<Factory, InstanceError> {
-    let builder = node
-        .service_builder(&service_name("graph/hot")?)
-        .publish_subscribe::<[Word]>()
-        .max_publishers(MAX_PROCESSES)
-        .max_subscribers(MAX_PROCESSES)
-        .max_nodes(MAX_PROCESSES)
-        .history_size(1)
-        .subscriber_max_buffer_size(1)
-        .subscriber_max_borrowed_samples(2 * MAX_PROCESSES)
-        .enable_safe_overflow(true);
-    one_at_a_time(node, || builder.open_or_create()).map_err(|e| ipc("the hot attributes", e))
-}
-
-/// An owner's page.
-#[derive(Debug)]
-pub(super) struct OwnPage {
-    publisher: IpcPublisher<Ipc, [Word], ()>,
-    start: *const Word,
-    newcomers_at: Mutex<Instant>,
-}
-
-// SAFETY: the page is a range of atomics, which any thread may use at any time, and the publisher
-// that owns it is itself safe to send and share.
-unsafe impl Send for OwnPage {}
-// SAFETY: as above.
-unsafe impl Sync for OwnPage {}
-
-impl OwnPage {
-    pub(super) fn open(node: &IpcNode, agent: &str) -> Result<Self, InstanceError> {
-        let publisher = service(node)?
-            .publisher_builder()
-            .initial_max_slice_len(PAGE_WORDS)
-            .allocation_strategy(AllocationStrategy::Static)
-            .max_loaned_samples(1)
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            .override_sample_preallocation(|_| 2)
-            .create()
-            .map_err(|e| ipc("a page of hot attributes", e))?;
-        let loan = publisher.loan_slice_uninit(PAGE_WORDS);
-        let loan = loan.map_err(|e| ipc("a page of hot attributes", e))?;
-        let sample = loan.write_from_fn(|_| Word::default());
-        let start = sample.payload().as_ptr();
-        let page = Self {
-            publisher,
-            start,
-            newcomers_at: Mutex::new(now()),
-        };
-        hot::format(page.words(), hash(agent));
-        sample
-            .send()
-            .map_err(|e| ipc("a page of hot attributes", e))?;
-        Ok(page)
-    }
-
-    pub(super) fn claim(&self, key: Key) -> Option<usize> {
-        hot::claim(self.words(), key)
-    }
-
-    fn words(&self) -> &[Word] {
-        // SAFETY: `start` points to the words of the one sample that the publisher ever loans, all
-        // initialised; it stays in the publisher's history, so that its memory is never loaned again,
-        // and mapped while the publisher lives. Others only ever touch it through atomics.
-        unsafe { std::slice::from_raw_parts(self.start, PAGE_WORDS) }
-    }
-
-    /// Hands the page to sessions that joined since the last time, now and then.
-    fn serve_newcomers(&self) {
-        let Ok(mut at) = self.newcomers_at.try_lock() else {
-            return;
-        };
-        let time = now();
-        if time >= *at {
-            *at = time + NEWCOMERS;
-            if let Err(error) = self.publisher.update_connections() {
-                tracing::debug!("the page's connections: {error}");
-            }
-        }
-    }
+/// A page for the hot attributes of that agent.
+pub(super) fn page(node: &IpcNode, agent: &str) -> Result<OwnPage, InstanceError> {
+    let format = |words: &[Word]| hot::format(words, hash(agent));
+    OwnPage::open(node, HOT, PAGE_WORDS, format)
 }
 
 /// An attribute that this process owns and writes as often as it likes, see
@@ -205,33 +120,26 @@ impl HotAttribute {
 /// The pages of all owners, as a session sees them.
 #[derive(Debug)]
 pub(super) struct HotSubscriber {
-    subscriber: IpcSubscriber<Ipc, [Word], ()>,
+    arriving: Pages,
     pages: Arc<Vec<Arc<Segment>>>,
 }
 
 impl HotSubscriber {
     pub(super) fn open(node: &IpcNode) -> Result<Self, InstanceError> {
-        let subscriber = service(node)?
-            .subscriber_builder()
-            .create()
-            .map_err(|e| ipc("the hot attributes", e))?;
         Ok(Self {
-            subscriber,
+            arriving: Pages::open(node, HOT)?,
             pages: Arc::default(),
         })
     }
 
-    /// The pages that have come; `None` where there are none.
-    pub(super) fn poll(&mut self) -> Result<Option<Arc<Vec<Arc<Segment>>>>, InstanceError> {
-        while let Some(sample) = self
-            .subscriber
-            .receive()
-            .map_err(|e| ipc("the hot attributes", e))?
-        {
-            let (start, len) = (sample.payload().as_ptr(), sample.payload().len());
-            // SAFETY: the payload is `len` atomics in shared memory that stays mapped while the
-            // sample lives, and moving the sample does not move it.
-            let page = unsafe { Segment::in_shared_memory(start, len, Box::new(sample)) };
+    /// The pages that have come at the last [`Self::poll`]; `None` where there are none.
+    pub(super) fn pages(&self) -> Option<Arc<Vec<Arc<Segment>>>> {
+        (!self.pages.is_empty()).then(|| Arc::clone(&self.pages))
+    }
+
+    /// Takes what has come.
+    pub(super) fn poll(&mut self) -> Result<(), InstanceError> {
+        while let Some(page) = self.arriving.receive()? {
             let Some(owner) = hot::owner_of(page.words()) else {
                 continue;
             };
@@ -244,6 +152,6 @@ impl HotSubscriber {
             pages.push(Arc::new(page));
             self.pages = Arc::new(pages);
         }
-        Ok((!self.pages.is_empty()).then(|| Arc::clone(&self.pages)))
+        Ok(())
     }
 }

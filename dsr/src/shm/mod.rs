@@ -13,6 +13,7 @@ mod channel;
 mod gate;
 mod hot;
 mod lease;
+mod page;
 mod presence;
 mod segment;
 mod session;

@@ -15,15 +15,15 @@ use commit::{ASKED, SPIN};
 
 use super::arena::ArenaSubscriber;
 use super::changes::Changes;
-use super::hot::{HotAttribute, HotError, HotSubscriber, OwnPage};
+use super::hot::{self, HotAttribute, HotError, HotSubscriber};
 use super::lease::Tenant;
+use super::page::OwnPage;
 use super::{
     Instance, InstanceError, Ipc, IpcNode, MAX_PROCESSES, Publisher, Subscriber, ipc, now,
     one_at_a_time, pause, service_name,
 };
-use crate::arena::Arena;
-use crate::arena::record;
-use crate::hot::{Hot, Key};
+use crate::arena::{Arena, Root, record};
+use crate::hot::{Hot, Key, claim};
 use crate::{
     AttributeId, EdgeKey, Epoch, Filter, NodeId, NodeRef, Owner, ReadError, Schema, Snapshot,
 };
@@ -36,11 +36,16 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use thiserror::Error;
 
 pub(super) const CHANGES: &str = "graph/changes";
 pub(super) const REQUESTS_EVENT: &str = "graph/wake";
+
+/// How long a session may go on without a look for memory that it does not have: asking iceoryx2 takes
+/// longer than all else of a snapshot. Whoever brings such memory waits for so long before it is
+/// relied on, so that a look that begins afterwards finds it.
+pub(super) const NEWS: Duration = Duration::from_micros(50);
 
 /// How long a store may take to answer before the asker gives up.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -87,6 +92,11 @@ pub struct Session {
     client: Client<Ipc, [u8], (), [u8], ()>,
     wake_store: Notifier<Ipc>,
     clock: Option<(Listener<Ipc>, Subscriber<Tick>)>,
+    /// When it last looked for memory that it does not have: of another store, of owners of hot
+    /// attributes.
+    looked: Option<Instant>,
+    /// The root that was read last, and of which store's life it is.
+    root: Option<(Epoch, Root)>,
     /// The pages of hot attributes, once the schema has some.
     hot: Option<HotSubscriber>,
     /// This session's own.
@@ -133,6 +143,8 @@ impl Session {
             client,
             wake_store,
             clock: None,
+            looked: None,
+            root: None,
             hot: None,
             page: None,
             tenant: None,
@@ -203,8 +215,17 @@ impl Session {
     }
 
     fn arena(&mut self) -> Result<Option<(Epoch, Arc<Arena>)>, InstanceError> {
-        let found = self.arena.poll()?;
-        Ok(found.filter(|(epoch, arena)| {
+        // Before the look: what comes during it may go unseen.
+        let time = now();
+        let known = self.looked.filter(|_| self.arena.newest().is_some());
+        if known.is_none_or(|looked| time.saturating_duration_since(looked) >= NEWS) {
+            self.arena.poll()?;
+            if let Some(hot) = &mut self.hot {
+                hot.poll()?;
+            }
+            self.looked = Some(time);
+        }
+        Ok(self.arena.newest().filter(|(epoch, arena)| {
             // Segments arrive in order; the snapshot waits for the last.
             arena.epoch() == Some(*epoch)
         }))
@@ -238,7 +259,11 @@ impl Session {
             }
         };
         loop {
-            let root = arena.newest_root()?;
+            let root = match self.root {
+                Some((of, root)) if of == epoch && root.version == arena.head() => root,
+                _ => arena.newest_root()?,
+            };
+            self.root = Some((epoch, root));
             // A version made since the last look may lie in a segment that has come since.
             if arena.announced_segments() > arena.attached() as u64 {
                 self.arena.poll()?;
@@ -275,12 +300,10 @@ impl Session {
     /// What owners give out beside a graph with that schema.
     fn hot_of(&mut self, epoch: Epoch, schema: &Schema) -> Result<Option<Hot>, InstanceError> {
         if self.hot.is_none() && schema.has_hot() {
-            self.hot = Some(HotSubscriber::open(&self.node)?);
+            self.hot.insert(HotSubscriber::open(&self.node)?).poll()?;
         }
-        let Some(hot) = &mut self.hot else {
-            return Ok(None);
-        };
-        Ok(hot.poll()?.map(|pages| Hot { pages, epoch }))
+        let pages = self.hot.as_ref().and_then(HotSubscriber::pages);
+        Ok(pages.map(|pages| Hot { pages, epoch }))
     }
 
     /// Makes this process the one that gives out an attribute beside the graph, so that it can be
@@ -304,10 +327,10 @@ impl Session {
         };
         let page = match &self.page {
             Some(page) => Arc::clone(page),
-            None => Arc::new(OwnPage::open(&self.node, &self.agent)?),
+            None => Arc::new(hot::page(&self.node, &self.agent)?),
         };
         self.page = Some(Arc::clone(&page));
-        let slot = page.claim(key).ok_or(HotError::Full)?;
+        let slot = claim(page.words(), key).ok_or(HotError::Full)?;
         Ok(HotAttribute {
             page,
             slot,

@@ -6,8 +6,8 @@ mod answer;
 use super::arena::ArenaPublisher;
 use super::lease::Landlord;
 use super::presence::Names;
-use super::session::{ANSWERS, CHANGES, REQUESTS_EVENT, Request, event, requests};
-use super::{Instance, InstanceError, Ipc, IpcNode, Publisher, bell, ipc, now, wait};
+use super::session::{ANSWERS, CHANGES, NEWS, REQUESTS_EVENT, Request, event, requests};
+use super::{Instance, InstanceError, Ipc, IpcNode, Publisher, bell, ipc, now, pause, wait};
 use crate::arena::allocator::Full;
 use crate::graph::{Image, STORE};
 use crate::state::Keeper;
@@ -91,6 +91,8 @@ pub struct Store {
     /// Who is to be told of a commit once it is on disk.
     waiting: Vec<Waiting>,
     spin: Duration,
+    /// Whether other processes can see the graph.
+    announced: bool,
     /// Until when to look for the next request.
     awake_until: Instant,
     newcomers_at: Instant,
@@ -148,6 +150,7 @@ impl Store {
             durability: Durability::InMemory,
             waiting: Vec::new(),
             spin: SPIN,
+            announced: false,
             awake_until: now(),
             newcomers_at: now(),
             node,
@@ -304,7 +307,14 @@ impl Store {
     /// # Errors
     /// [`StoreError::Instance`] where the instance's shared memory is gone.
     pub fn serve(&mut self, patience: Duration) -> Result<usize, StoreError> {
-        self.graph.announce();
+        if !self.announced {
+            // What is acknowledged from now on every session sees: by then none goes on with the
+            // memory of a store before this one.
+            self.arena.serve_newcomers();
+            pause(NEWS);
+            self.graph.announce();
+            self.announced = true;
+        }
         loop {
             let served = self.answer_all()?;
             let time = now();
