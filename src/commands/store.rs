@@ -1,7 +1,6 @@
 //! `cortex store`: the process that alone writes an instance's graph.
 
 use crate::cli::Store as Arguments;
-use crate::supervise::now;
 use crate::{Answer, Failure};
 use dsr::{Durability, Graph, Image, Instance, Pace, Schema, State, Store, Turns};
 use grammar::Grammar;
@@ -11,8 +10,6 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// How often the store looks after the dead.
-const CLEANING: Duration = Duration::from_secs(1);
 /// How far groups of commits that nobody waits for are apart on their way to the disk.
 const SYNC_INTERVAL: Duration = Duration::from_millis(100);
 
@@ -51,15 +48,10 @@ fn serve(arguments: &Arguments, instance: &Instance, pace: Pace) -> Result<(), F
         kept.map_err(Failure::internal)?;
     }
     let mut lifeline = Turns::begin(pace, interrupted).map_err(Failure::internal)?;
-    let mut cleaning_at = now() + CLEANING;
     while !lifeline.ended() {
         store
             .serve(Duration::from_millis(25))
             .map_err(Failure::internal)?;
-        if now() >= cleaning_at {
-            cleaning_at = now() + CLEANING;
-            store.clean_up_after_the_dead();
-        }
     }
     Ok(())
 }

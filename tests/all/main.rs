@@ -15,6 +15,7 @@ mod faults;
 mod graph;
 mod hostile;
 mod hot;
+mod leftovers;
 mod live_rules;
 mod missions;
 mod path;

@@ -77,13 +77,8 @@ fn store(instance: &Instance, image: Option<&String>) -> Outcome {
     });
     println!("ready");
     let ended = end_of_input();
-    let mut round = 0u32;
     while !ended.load(Ordering::Acquire) {
         store.serve(Duration::from_millis(20))?;
-        round = round.wrapping_add(1);
-        if round.is_multiple_of(40) {
-            store.clean_up_after_the_dead();
-        }
     }
     Ok(())
 }

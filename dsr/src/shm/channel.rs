@@ -29,7 +29,7 @@ fn service(node: &IpcNode, name: &str) -> Result<PortFactory<Ipc, [u8], ()>, Ins
         .subscriber_max_borrowed_samples(2)
         .history_size(0)
         .enable_safe_overflow(true);
-    one_at_a_time(node, || builder.open_or_create())
+    one_at_a_time(node, || builder.clone().open_or_create())
         .map_err(|e| ipc(&format!("channel `{name}`"), e))
 }
 

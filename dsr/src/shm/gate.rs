@@ -6,7 +6,7 @@
 //! a lock makes it all of the time. The lock is one on the instance's folder, which leaves no file
 //! behind and is given back by the kernel when its holder dies.
 
-use super::{Instance, InstanceError, IpcNode, ipc};
+use super::{Instance, InstanceError, IpcNode, ipc, leftovers};
 use iceoryx2::config::Config;
 use iceoryx2::node::Node;
 use iceoryx2::prelude::{NodeBuilder, SignalHandlingMode};
@@ -76,19 +76,34 @@ impl Gate {
             }
         }
     }
+
+    /// Goes through the gate of an instance that is there. `None` as above, and where it is not.
+    pub(super) fn of(config: &Config) -> Option<Self> {
+        let folder = config.global.root_path().to_string();
+        lock(Path::new(&folder)).ok().flatten()
+    }
 }
 
-/// Opens something that several processes may open at once, one process after the other.
-pub(super) fn one_at_a_time<T>(node: &IpcNode, open: impl FnOnce() -> T) -> T {
-    let folder = node.config().global.root_path().to_string();
+/// Opens something that several processes may open at once, one process after the other. Where that
+/// fails it is tried again without what dead processes left: places that they hold, a service that
+/// one of them had begun to make.
+pub(super) fn one_at_a_time<T, E>(node: &IpcNode, open: impl Fn() -> Result<T, E>) -> Result<T, E> {
+    let config = node.config();
     // Without the gate it works too, but for bad luck.
-    let gate = lock(Path::new(&folder)).ok().flatten();
-    if gate.is_some() {
-        remove_half_made(Path::new(&node.config().global.service_dir().to_string()));
-    } else {
+    let Some(_gate) = Gate::of(config) else {
+        let folder = config.global.root_path();
         tracing::warn!("another process has held {folder} for {PATIENCE:?}; is it stopped?");
-    }
-    open()
+        return open();
+    };
+    remove_half_made(Path::new(&config.global.service_dir().to_string()));
+    leftovers::remove_half_made(config, |name| name.ends_with(".dynamic"));
+    open().or_else(|first| match leftovers::clean(config, || Some(())) {
+        Ok(_) => open(),
+        Err(error) => {
+            tracing::debug!("cleaning up after dead processes: {error}");
+            Err(first)
+        }
+    })
 }
 
 /// Removes the descriptions of services whose maker was killed while it made them: iceoryx2 would wait
@@ -150,6 +165,11 @@ fn seal(instance: &Instance) -> Result<bool, InstanceError> {
         let metadata = fs::symlink_metadata(&path).map_err(io)?;
         if metadata.uid() != rustix::process::getuid().as_raw() || !metadata.is_file() {
             return Err(InstanceError::Foreign { path });
+        }
+        // Made by a process that was killed at that: everybody else would wait for it.
+        if leftovers::is_half_made(&metadata) {
+            fs::remove_file(&path).map_err(io)?;
+            continue;
         }
         if metadata.mode().trailing_zeros() >= 6 {
             sealed = true;

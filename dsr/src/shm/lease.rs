@@ -70,7 +70,7 @@ fn service(node: &IpcNode) -> Result<Factory, InstanceError> {
         .max_clients(MAX_PROCESSES)
         .max_nodes(MAX_PROCESSES)
         .max_active_requests_per_client(4);
-    one_at_a_time(node, || builder.open_or_create()).map_err(|e| ipc("leases", e))
+    one_at_a_time(node, || builder.clone().open_or_create()).map_err(|e| ipc("leases", e))
 }
 
 /// The asking end.

@@ -13,6 +13,7 @@ mod channel;
 mod gate;
 mod hot;
 mod lease;
+mod leftovers;
 mod page;
 mod presence;
 mod segment;
@@ -30,13 +31,12 @@ pub use store::{Store, StoreError};
 
 use gate::{Gate, one_at_a_time};
 use iceoryx2::config::Config;
-use iceoryx2::node::NodeView;
 use iceoryx2::port::listener::{Listener, ListenerWaitError};
 use iceoryx2::prelude::{
-    CallbackProgression, FileName, LogLevel, NodeState, Path as IpcPath, SemanticString,
-    ServiceName, ipc_threadsafe, set_log_level,
+    FileName, LogLevel, Path as IpcPath, SemanticString, ServiceName, ipc_threadsafe, set_log_level,
 };
 use iceoryx2::service::Service;
+use leftovers::Members;
 use std::fs;
 use std::hash::Hasher;
 use std::io;
@@ -254,19 +254,8 @@ impl Instance {
     /// # Errors
     /// [`InstanceError`].
     pub fn processes(&self) -> Result<Vec<u32>, InstanceError> {
-        let mut alive = Vec::new();
-        IpcNode::list(&self.config()?, |state| {
-            if let NodeState::Alive(node) = state
-                && let Ok(process) = node.id().pid::<Ipc>()
-            {
-                alive.push(process.value().cast_unsigned());
-            }
-            CallbackProgression::Continue
-        })
-        .map_err(|e| ipc("listing the instance's processes", e))?;
-        alive.sort_unstable();
-        alive.dedup();
-        Ok(alive)
+        let members = Members::of(&self.config()?)?;
+        Ok(members.alive.into_iter().collect())
     }
 
     /// The instance's files in shared memory.
@@ -274,19 +263,10 @@ impl Instance {
     /// # Errors
     /// [`InstanceError::Io`] where shared memory cannot be listed.
     pub fn shared_memory(&self) -> Result<Vec<PathBuf>, InstanceError> {
-        let io = |source| InstanceError::Io {
+        memory_of(&self.prefix()).map_err(|source| InstanceError::Io {
             path: SHARED_MEMORY.into(),
             source,
-        };
-        let prefix = self.prefix();
-        let mut files = Vec::new();
-        for entry in fs::read_dir(SHARED_MEMORY).map_err(io)? {
-            let entry = entry.map_err(io)?;
-            if entry.file_name().to_string_lossy().starts_with(&prefix) {
-                files.push(entry.path());
-            }
-        }
-        Ok(files)
+        })
     }
 
     fn config(&self) -> Result<Config, InstanceError> {
@@ -301,8 +281,8 @@ impl Instance {
         config.global.set_root_path(&path);
         config.global.prefix = FileName::new(self.prefix().as_bytes())
             .map_err(|_| ipc("the instance's name is too long"))?;
-        // A process that was killed is cleaned up after by its supervisor and by the store, not by
-        // whoever comes by: cleaning races with processes that are starting.
+        // A process that was killed is cleaned up after by the store, not by whoever comes by: cleaning
+        // races with processes that are starting.
         config.global.node.cleanup_dead_nodes_on_creation = false;
         config.global.node.cleanup_dead_nodes_on_destruction = false;
         config.global.service.cleanup_dead_nodes_on_open = false;
@@ -322,6 +302,18 @@ impl Instance {
         }
         gate::join(self, &self.config()?)
     }
+}
+
+/// The files in shared memory whose names start with that.
+fn memory_of(prefix: &str) -> io::Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(SHARED_MEMORY)? {
+        let entry = entry?;
+        if entry.file_name().to_string_lossy().starts_with(prefix) {
+            files.push(entry.path());
+        }
+    }
+    Ok(files)
 }
 
 /// A service's name; all of ours are valid.

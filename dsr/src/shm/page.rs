@@ -35,7 +35,8 @@ fn service(node: &IpcNode, name: &str) -> Result<Factory, InstanceError> {
         .subscriber_max_buffer_size(1)
         .subscriber_max_borrowed_samples(2 * MAX_PROCESSES)
         .enable_safe_overflow(true);
-    one_at_a_time(node, || builder.open_or_create()).map_err(|e| ipc(&format!("pages `{name}`"), e))
+    one_at_a_time(node, || builder.clone().open_or_create())
+        .map_err(|e| ipc(&format!("pages `{name}`"), e))
 }
 
 /// An owner's page.

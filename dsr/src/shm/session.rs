@@ -60,7 +60,8 @@ pub(super) fn event(
         .max_listeners(MAX_PROCESSES)
         .max_notifiers(MAX_PROCESSES)
         .max_nodes(MAX_PROCESSES);
-    one_at_a_time(node, || builder.open_or_create()).map_err(|e| ipc(&format!("event `{name}`"), e))
+    one_at_a_time(node, || builder.clone().open_or_create())
+        .map_err(|e| ipc(&format!("event `{name}`"), e))
 }
 
 /// Why a process cannot see the graph.

@@ -5,6 +5,7 @@ mod answer;
 
 use super::arena::ArenaPublisher;
 use super::lease::Landlord;
+use super::leftovers::Cleaner;
 use super::presence::Names;
 use super::session::{ANSWERS, CHANGES, NEWS, REQUESTS_EVENT, Request, event, requests};
 use super::{Instance, InstanceError, Ipc, IpcNode, Publisher, bell, ipc, now, pause, wait};
@@ -42,6 +43,9 @@ pub enum StoreError {
     /// The operating system gave no thread.
     #[error("the state cannot be kept: {0}")]
     Thread(std::io::Error),
+    /// The operating system gave no thread.
+    #[error("what dead processes leave cannot be removed: {0}")]
+    Cleaner(std::io::Error),
 }
 
 /// What became of a transaction.
@@ -68,6 +72,8 @@ const LOOK: Duration = Duration::from_millis(10);
 /// The store of an instance: one process holds it, and it alone writes the graph.
 #[derive(Debug)]
 pub struct Store {
+    // Dropped first: no port of this store is dead yet.
+    _cleaner: Cleaner,
     graph: Graph,
     arena: ArenaPublisher,
     server: Server<Ipc, [u8], (), [u8], ()>,
@@ -109,7 +115,7 @@ impl Store {
         instance.create_folder()?;
         let node = instance.join()?;
         // A store that was killed has left its ports behind, which count.
-        node.try_cleanup_dead_nodes();
+        let cleaner = Cleaner::start(&node).map_err(StoreError::Cleaner)?;
         let arena = ArenaPublisher::open(&node)?;
         let epoch = new_epoch();
         let (memory, growth) = arena.arena(epoch);
@@ -132,6 +138,7 @@ impl Store {
         let landlord = Landlord::open(&node, began)?;
         let last_time = Time::default();
         Ok(Self {
+            _cleaner: cleaner,
             graph,
             arena,
             server,
@@ -410,18 +417,6 @@ impl Store {
             bell::ring(self.graph.arena());
         }
         Ok(served)
-    }
-
-    /// Removes what processes that died left in the instance.
-    pub fn clean_up_after_the_dead(&self) {
-        let state = self.node.try_cleanup_dead_nodes();
-        if state.cleanups + state.failed_cleanups > 0 {
-            tracing::info!(
-                "dead processes: {} cleaned, {} not",
-                state.cleanups,
-                state.failed_cleanups
-            );
-        }
     }
 }
 

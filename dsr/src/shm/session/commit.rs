@@ -59,7 +59,8 @@ pub(in crate::shm) fn requests(node: &IpcNode) -> Result<RequestFactory, Instanc
         .max_clients(MAX_PROCESSES)
         .max_nodes(MAX_PROCESSES)
         .max_active_requests_per_client(ASKED);
-    one_at_a_time(node, || builder.open_or_create()).map_err(|e| ipc("the store's requests", e))
+    one_at_a_time(node, || builder.clone().open_or_create())
+        .map_err(|e| ipc("the store's requests", e))
 }
 
 /// Why a commit did not come about, or may not have.
