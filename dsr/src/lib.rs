@@ -9,6 +9,7 @@
 
 mod arena;
 mod change;
+mod desk;
 mod difference;
 mod graph;
 mod hot;

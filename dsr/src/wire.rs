@@ -1,7 +1,8 @@
 //! What goes between processes as bytes, for who speaks to a store without this crate's sessions
 //! and for whoever tries to break it. It guarantees that no bytes make a decoder panic.
 
-use crate::{Change, Refusal, Transaction};
+use crate::arena::Word;
+use crate::{Change, Epoch, Refusal, Time, Transaction, desk};
 
 /// Reads a transaction as a request holds it.
 ///
@@ -16,6 +17,47 @@ pub fn decode_transaction(bytes: &[u8]) -> Result<Transaction, Refusal> {
 /// # Errors
 /// [`Refusal::Malformed`].
 pub fn decode_change(bytes: &[u8]) -> Result<Change, Refusal> {
+    postcard::from_bytes(bytes).map_err(|error| Refusal::Malformed(error.to_string()))
+}
+
+/// Reads the request for the store of that epoch that lies on a session's desk, as the store does.
+/// `None` where none does.
+///
+/// # Errors
+/// [`Refusal::Malformed`].
+pub fn decode_desk(words: &[u64], epoch: Epoch) -> Option<Result<(Time, Transaction), Refusal>> {
+    let page: Vec<Word> = words.iter().map(|_| Word::default()).collect();
+    for (word, value) in page.iter().zip(words) {
+        word.store(*value);
+    }
+    desk::owner_of(&page)?;
+    let request = desk::request_of(&page);
+    let mut bytes = Vec::new();
+    desk::take(request, desk::state(request), epoch, &mut bytes)?;
+    Some(decode_laid(&bytes))
+}
+
+/// The desk of that owner, with its first request on it, for the store of that epoch. `None` where the
+/// agent's name or the transaction is too long for one.
+pub fn encode_desk(
+    (client, process, agent): (u64, u32, &str),
+    epoch: Epoch,
+    time: Time,
+    transaction: &Transaction,
+) -> Option<Vec<u64>> {
+    let page: Vec<Word> = (0..desk::DESK_WORDS).map(|_| Word::default()).collect();
+    let owner = desk::Owner {
+        client,
+        process,
+        agent: agent.to_owned(),
+    };
+    let bytes = postcard::to_stdvec(&(time, transaction)).ok()?;
+    let laid = desk::format(&page, &owner) && desk::lay(desk::request_of(&page), 1, epoch, &bytes);
+    laid.then(|| page.iter().map(Word::load).collect())
+}
+
+/// Reads what lies on a desk.
+pub(crate) fn decode_laid(bytes: &[u8]) -> Result<(Time, Transaction), Refusal> {
     postcard::from_bytes(bytes).map_err(|error| Refusal::Malformed(error.to_string()))
 }
 
@@ -46,6 +88,26 @@ mod tests {
         book.extend(0.5f64.to_le_bytes());
         book.push(2);
         assert_eq!(bytes, book);
+    }
+
+    #[test]
+    fn a_desk_is_that_of_the_book() {
+        let mut transaction = Transaction::new();
+        transaction.set(crate::NodeId(3), "a", 0.5);
+        let time = Time::from_nanoseconds(-1);
+        let desk = encode_desk((5, 6, "driver"), Epoch(7), time, &transaction).unwrap();
+        let word = |bytes: &[u8; 8]| u64::from_le_bytes(*bytes);
+        let mut book = vec![0; 512];
+        book[..4].copy_from_slice(&[word(b"cortexD1"), 5, 6, 6]);
+        book[8] = word(b"driver\0\0");
+        book[40..44].copy_from_slice(&[2, 0, 7, 19]);
+        book[44] = word(&[1, 0, 1, 5, 0, 0, 3, 1]);
+        book[45] = word(&[b'a', 6, 0, 0, 0, 0, 0, 0]);
+        book[46] = word(&[0xe0, 0x3f, 0, 0, 0, 0, 0, 0]);
+        assert_eq!(desk, book);
+        let read = decode_desk(&desk, Epoch(7)).unwrap().unwrap();
+        assert_eq!(read, (time, transaction));
+        assert!(decode_desk(&desk, Epoch(8)).is_none());
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //! program would. It guarantees nothing; that is what it is for: whatever the bytes, no function
 //! here may panic or go on for ever. The tests of the workspace run the same functions.
 
-use dsr::{Graph, ReadError, Schema, Snapshot, Time, Transaction, Version};
+use dsr::{Epoch, Graph, ReadError, Schema, Snapshot, Time, Transaction, Version};
 
 fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
@@ -41,6 +41,20 @@ pub fn world(bytes: &[u8]) {
 /// A transaction as it goes to the store.
 pub fn transaction(bytes: &[u8]) {
     if let Ok(transaction) = dsr::wire::decode_transaction(bytes) {
+        commit(&transaction);
+    }
+}
+
+/// A session's desk, as the store reads it: any words, but for the one that says that it is a desk.
+pub fn desk(bytes: &[u8]) {
+    let mut words = vec![u64::from_le_bytes(*b"cortexD1")];
+    words.extend(bytes.chunks_exact(8).map(|eight| {
+        let eight = eight.iter().rev();
+        eight.fold(0, |word, byte| word << 8 | u64::from(*byte))
+    }));
+    words.resize(512, 0);
+    let epoch = Epoch(words[42]);
+    if let Some(Ok((_, transaction))) = dsr::wire::decode_desk(&words, epoch) {
         commit(&transaction);
     }
 }

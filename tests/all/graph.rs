@@ -171,6 +171,8 @@ fn a_killed_store_is_replaced_without_losing_a_commit_and_agents_find_the_new_on
     assert_eq!(image.version(), Version(51));
     let mut store = Store::open(&instance.0, Schema::open()).unwrap();
     store.restore(&image).unwrap();
+    // Until the new store shows its graph, the old one is read.
+    assert_eq!(session.epoch().unwrap(), old);
     let transaction = {
         let mut transaction = Transaction::new();
         transaction.create_edge("n0", "next", "n49");

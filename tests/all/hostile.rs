@@ -6,8 +6,8 @@
 mod entries;
 
 use crate::support::root;
-use dsr::wire::{encode_change, encode_transaction};
-use dsr::{Graph, Image, Schema, Time, Transaction};
+use dsr::wire::{encode_change, encode_desk, encode_transaction};
+use dsr::{Epoch, Graph, Image, Schema, Time, Transaction};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 
@@ -152,6 +152,18 @@ fn transactions_and_changes() {
         .commit(&transaction(), "agent", Time::default())
         .unwrap();
     withstands(entries::change, &encode_change(&change));
+}
+
+#[test]
+fn desks() {
+    let owner = (5, 6, "agent");
+    let mut short = Transaction::new();
+    short.create_node("thing", "n", vec![("text".to_owned(), "abc".into())]);
+    let desk = encode_desk(owner, Epoch(7), Time::default(), &short).unwrap();
+    // The first word is given.
+    let bytes = desk[1..].iter().flat_map(|word| word.to_le_bytes());
+    let bytes: Vec<u8> = bytes.collect();
+    withstands(entries::desk, &bytes);
 }
 
 #[test]

@@ -14,6 +14,7 @@ pub(crate) mod table;
 pub(crate) mod tree;
 pub(crate) mod trie;
 
+use crate::desk::{SLOT_WORDS, SLOTS};
 use crate::shm::{Segment, Segments};
 use crate::{Epoch, Time, Version};
 use std::sync::atomic::{AtomicU64, Ordering, fence};
@@ -63,7 +64,7 @@ pub enum ReadError {
 }
 
 pub(crate) const MAGIC: u64 = u64::from_le_bytes(*b"cortexG1");
-pub(crate) const FORMAT: u64 = 3;
+pub(crate) const FORMAT: u64 = 4;
 
 /// Header words of segment 0.
 mod at {
@@ -76,7 +77,8 @@ mod at {
     pub(super) const BELL: usize = 6;
     pub(super) const ASLEEP: usize = 7;
     pub(super) const LEASES: usize = 16;
-    pub(super) const ROOTS: usize = 64;
+    pub(super) const SLOTS: usize = 64;
+    pub(super) const ROOTS: usize = SLOTS + super::SLOTS * super::SLOT_WORDS;
 }
 
 /// How many leases there may be at once.
@@ -441,6 +443,16 @@ impl Arena {
             word.store(token);
         }
         fence(Ordering::Release);
+    }
+
+    /// The place for the answers to a session, where there is one of that number.
+    #[inline]
+    pub(crate) fn slot(&self, index: usize) -> Option<&[Word]> {
+        let start = at::SLOTS + index * SLOT_WORDS;
+        let there = index < SLOTS;
+        self.from(0)?
+            .get(start..start + SLOT_WORDS)
+            .filter(|_| there)
     }
 
     fn lease_holds(&self, mark: LeaseMark) -> bool {

@@ -108,7 +108,8 @@ impl EdgeRecord {
     }
 }
 
-pub(super) fn pack(bytes: &[u8]) -> impl Iterator<Item = u64> {
+/// Bytes as words.
+pub(crate) fn pack(bytes: &[u8]) -> impl Iterator<Item = u64> {
     bytes.chunks(8).map(|chunk| {
         let mut eight = [0; 8];
         eight[..chunk.len()].copy_from_slice(chunk);

@@ -4,6 +4,7 @@
 //! iceoryx2 does not promise that a sample may be written after it was sent; its version is pinned
 //! and `tests/all/graph.rs` holds the construct.
 
+use super::page::LINE;
 use super::{
     InstanceError, Ipc, IpcNode, MAX_PROCESSES, MAX_STORES, Segment, ipc, one_at_a_time,
     service_name,
@@ -44,6 +45,7 @@ fn service(node: &IpcNode) -> Result<Factory, InstanceError> {
         .service_builder(&service_name("graph/arena")?)
         .publish_subscribe::<[Word]>()
         .user_header::<SegmentHeader>()
+        .payload_alignment(LINE)
         .max_publishers(MAX_STORES)
         .max_subscribers(MAX_PROCESSES)
         .max_nodes(MAX_PROCESSES)
@@ -199,6 +201,8 @@ impl Current {
 pub(crate) struct ArenaSubscriber {
     subscriber: IpcSubscriber<Ipc, [Word], SegmentHeader>,
     arena: Option<(Epoch, Arc<Arena>)>,
+    /// That of a store which does not show it yet: it may be filling it.
+    coming: Option<(Epoch, Arc<Arena>)>,
     pub(super) current: Current,
     /// Segments of an epoch whose first segment is not here yet.
     early: Vec<Sample<Ipc, [Word], SegmentHeader>>,
@@ -214,13 +218,21 @@ impl ArenaSubscriber {
         Ok(Self {
             subscriber,
             arena: None,
+            coming: None,
             current: Current::default(),
             early: Vec::new(),
         })
     }
 
-    /// The newest store's arena as far as it has arrived at the last [`Self::poll`].
-    pub(super) fn newest(&self) -> Option<(Epoch, Arc<Arena>)> {
+    /// The newest arena that has shown itself, of those that had begun to arrive at the last
+    /// [`Self::poll`].
+    pub(super) fn newest(&mut self) -> Option<(Epoch, Arc<Arena>)> {
+        if let Some((epoch, arena)) = &self.coming
+            && arena.epoch() == Some(*epoch)
+        {
+            self.current.set(Arc::clone(arena));
+            self.arena = self.coming.take();
+        }
         self.arena.clone()
     }
 
@@ -228,23 +240,23 @@ impl ArenaSubscriber {
     pub(crate) fn poll(&mut self) -> Result<(), InstanceError> {
         while let Some(sample) = self.subscriber.receive().map_err(|e| ipc("the arena", e))? {
             let header = *sample.user_header();
-            let known = self.arena.as_ref().map(|(epoch, _)| epoch.0);
-            if header.index == 0 && known != Some(header.epoch) {
+            let known = [&self.arena, &self.coming].into_iter().flatten();
+            let known = known
+                .map(|(epoch, arena)| (epoch.0, arena))
+                .find(|(epoch, _)| *epoch == header.epoch);
+            if let Some((_, arena)) = known {
+                arena.attach(header.index as usize, received(sample));
+            } else if header.index == 0 {
                 // A first segment of another epoch: a new store, whose arena replaces the old.
                 let arena = Arc::new(Arena::new(CAPACITY, SHIFT));
                 arena.attach(0, received(sample));
-                self.arena = Some((Epoch(header.epoch), Arc::clone(&arena)));
-                self.current.set(Arc::clone(&arena));
                 for early in self.early.drain(..) {
                     if early.user_header().epoch == header.epoch {
                         let index = early.user_header().index as usize;
                         arena.attach(index, received(early));
                     }
                 }
-            } else if known == Some(header.epoch) {
-                if let Some((_, arena)) = &self.arena {
-                    arena.attach(header.index as usize, received(sample));
-                }
+                self.coming = Some((Epoch(header.epoch), arena));
             } else {
                 self.early.push(sample);
             }

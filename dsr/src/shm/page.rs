@@ -18,8 +18,8 @@ use std::time::{Duration, Instant};
 
 /// How often an owner looks for processes that joined.
 const NEWCOMERS: Duration = Duration::from_millis(10);
-/// A page begins where a cache line does.
-const LINE: Alignment = Alignment::ALIGN_64;
+/// Pages begin where a cache line does.
+pub(super) const LINE: Alignment = Alignment::ALIGN_64;
 
 type Factory = PortFactory<Ipc, [Word], ()>;
 

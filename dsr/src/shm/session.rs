@@ -5,13 +5,16 @@
 
 mod clock;
 mod commit;
+mod desk;
 mod look;
 
 pub use clock::{ClockError, Tick};
 pub use commit::CommitError;
 pub(super) use commit::{ANSWERS, Request, requests};
+pub(super) use desk::DESKS;
 
 use commit::{ASKED, SPIN};
+use desk::Desk;
 
 use super::arena::ArenaSubscriber;
 use super::changes::Changes;
@@ -103,6 +106,8 @@ pub struct Session {
     /// This session's own.
     page: Option<Arc<OwnPage>>,
     tenant: Option<Arc<Tenant>>,
+    /// Where this session's requests lie, once it has made two.
+    desk: Option<Desk>,
     /// An epoch, and the first life of the store that its graph goes back to.
     lineage: Option<(Epoch, u64)>,
     id: u64,
@@ -149,6 +154,7 @@ impl Session {
             hot: None,
             page: None,
             tenant: None,
+            desk: None,
             lineage: None,
             id: new_session_id(),
             sequence: 0,
@@ -156,15 +162,8 @@ impl Session {
             scratch: Vec::new(),
             node,
         };
-        session.ring();
+        ring(&session.wake_store);
         Ok(session)
-    }
-
-    /// Wakes the store, if there is one.
-    fn ring(&self) {
-        if let Err(error) = self.wake_store.notify() {
-            tracing::debug!("waking the store: {error}");
-        }
     }
 
     /// Joins an instance and waits up to `patience` for its graph.
@@ -192,7 +191,7 @@ impl Session {
             if left.is_zero() {
                 return Err(self.no_store());
             }
-            self.ring();
+            ring(&self.wake_store);
             let nap = left.min(Duration::from_millis(5));
             pause(nap);
         }
@@ -218,18 +217,15 @@ impl Session {
     fn arena(&mut self) -> Result<Option<(Epoch, Arc<Arena>)>, InstanceError> {
         // Before the look: what comes during it may go unseen.
         let time = now();
-        let known = self.looked.filter(|_| self.arena.newest().is_some());
-        if known.is_none_or(|looked| time.saturating_duration_since(looked) >= NEWS) {
+        let looked = self.looked.filter(|_| self.arena.newest().is_some());
+        if looked.is_none_or(|looked| time.saturating_duration_since(looked) >= NEWS) {
             self.arena.poll()?;
             if let Some(hot) = &mut self.hot {
                 hot.poll()?;
             }
             self.looked = Some(time);
         }
-        Ok(self.arena.newest().filter(|(epoch, arena)| {
-            // Segments arrive in order; the snapshot waits for the last.
-            arena.epoch() == Some(*epoch)
-        }))
+        Ok(self.arena.newest())
     }
 
     /// The life of the store whose graph this process sees.
@@ -347,9 +343,8 @@ impl Session {
         })
     }
 
-    /// The first life of the store whose graph this process sees.
-    fn lineage(&mut self) -> Result<u64, AttachError> {
-        let (epoch, arena) = self.arena()?.ok_or_else(|| self.no_store())?;
+    /// The first life of the store of that epoch.
+    fn lineage(&mut self, epoch: Epoch, arena: &Arena) -> Result<u64, AttachError> {
         match self.lineage {
             Some((known, lineage)) if known == epoch => Ok(lineage),
             _ => {
@@ -395,6 +390,13 @@ impl Session {
         channel: &str,
     ) -> Result<Subscriber<T>, InstanceError> {
         Subscriber::open(&self.node, &format!("channel/{channel}"))
+    }
+}
+
+/// Wakes the store, if there is one.
+fn ring(store: &Notifier<Ipc>) {
+    if let Err(error) = store.notify() {
+        tracing::debug!("waking the store: {error}");
     }
 }
 

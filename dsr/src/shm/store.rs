@@ -2,6 +2,7 @@
 //! everybody what changed. It guarantees that a request that was answered is not applied again.
 
 mod answer;
+mod desks;
 
 use super::arena::ArenaPublisher;
 use super::lease::Landlord;
@@ -17,6 +18,7 @@ use crate::{
     Transaction, TransactionId, Version,
 };
 use answer::Answered;
+use desks::Desks;
 use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::server::Server;
@@ -66,6 +68,8 @@ struct Waiting {
 const SPIN: Duration = Duration::from_micros(50);
 /// How often a store that does not come to sleep looks for processes that joined.
 const NEWCOMERS: Duration = Duration::from_millis(1);
+/// How many looks at the desks go by between two at everything else, which take as long as all of them.
+const LOOKS: u32 = 128;
 /// How often it looks at what is over: old versions, leases.
 const LOOK: Duration = Duration::from_millis(10);
 
@@ -87,6 +91,13 @@ pub struct Store {
     round: u64,
     names: Names,
     landlord: Landlord,
+    desks: Desks,
+    /// Looks at the desks since the last one at everything else.
+    looks: u32,
+    /// Whether anything was answered since then.
+    is_busy: bool,
+    /// Whether somebody may sleep who has to hear of something.
+    has_news: bool,
     began: Instant,
     next_look: Instant,
     /// Where answers are put together; empty between uses.
@@ -136,6 +147,7 @@ impl Store {
         let changes = Publisher::open(&node, CHANGES)?;
         let began = now();
         let landlord = Landlord::open(&node, began)?;
+        let desks = Desks::open(&node, began)?;
         let last_time = Time::default();
         Ok(Self {
             _cleaner: cleaner,
@@ -149,6 +161,10 @@ impl Store {
             round: 0,
             names: Names::default(),
             landlord,
+            desks,
+            looks: 0,
+            is_busy: false,
+            has_news: false,
             began,
             next_look: began,
             scratch: Vec::new(),
@@ -217,8 +233,15 @@ impl Store {
     pub fn commit(&mut self, transaction: &Transaction, time: Time) -> Result<Commit, Refusal> {
         let answer = self.decide(transaction, STORE, time, None);
         self.tell();
-        bell::ring(self.graph.arena());
+        self.ring();
         answer
+    }
+
+    /// Wakes who has to hear of something.
+    fn ring(&mut self) {
+        if std::mem::take(&mut self.has_news) {
+            bell::ring(self.graph.arena());
+        }
     }
 
     fn decide(
@@ -250,6 +273,7 @@ impl Store {
         if changes.is_empty() || !self.changes.has_listeners() {
             return;
         }
+        self.has_news = true;
         if let Err(error) = self.changes.send(&changes) {
             // The commits stand; who listens sees the gap and reads the snapshot.
             tracing::warn!("{} changes were not sent: {error}", changes.len());
@@ -323,30 +347,42 @@ impl Store {
             self.announced = true;
         }
         loop {
-            let served = self.answer_all()?;
-            let time = now();
-            if served > 0 {
-                self.awake_until = time + self.spin;
+            let mut served = self.answer_desks();
+            self.looks += 1;
+            if self.looks >= LOOKS {
+                self.looks = 0;
+                served += self.answer_all()?;
+                let time = now();
+                if time >= self.newcomers_at {
+                    self.welcome(time)?;
+                }
+                if self.is_busy || served > 0 {
+                    self.is_busy = false;
+                    self.awake_until = time + self.spin;
+                } else if time >= self.awake_until {
+                    break;
+                }
             }
-            if time >= self.newcomers_at {
-                self.newcomers_at = time + NEWCOMERS;
-                self.arena.serve_newcomers();
-            }
+            self.ring();
             if served > 0 {
+                self.is_busy = true;
                 return Ok(served);
-            }
-            if time >= self.awake_until {
-                break;
             }
             std::hint::spin_loop();
         }
         self.sleep(patience)?;
-        self.arena.serve_newcomers();
-        let served = self.answer_all()?;
-        if served > 0 {
-            self.awake_until = now() + self.spin;
-        }
+        self.welcome(now())?;
+        let served = self.answer_desks() + self.answer_all()?;
+        self.ring();
+        self.is_busy = served > 0;
         Ok(served)
+    }
+
+    /// Sees to the processes that joined.
+    fn welcome(&mut self, time: Instant) -> Result<(), StoreError> {
+        self.newcomers_at = time + NEWCOMERS;
+        self.arena.serve_newcomers();
+        Ok(self.desks.adopt(self.graph.arena(), time)?)
     }
 
     /// Sleeps until somebody rings, for `patience` at the most.
@@ -355,7 +391,7 @@ impl Store {
         // Who sends a request after this sees that it must ring; what was sent before is seen here.
         arena.set_asleep(true);
         let waiting = self.server.has_requests();
-        let slept = match waiting {
+        let slept = match waiting.map(|waiting| waiting || self.desks.has_requests()) {
             Ok(false) => wait(&self.wake, patience, "waiting for requests"),
             Ok(true) => Ok(()),
             Err(error) => Err(ipc("looking for requests", error)),
@@ -413,9 +449,7 @@ impl Store {
                 None => reply(&active, &answered.answers, &mut self.scratch)?,
             }
         }
-        if served > 0 {
-            bell::ring(self.graph.arena());
-        }
+        self.has_news |= served > 0;
         Ok(served)
     }
 }

@@ -4,10 +4,12 @@
 use super::super::{
     InstanceError, Ipc, IpcNode, MAX_PROCESSES, bell, ipc, now, one_at_a_time, service_name,
 };
-use super::{AttachError, PATIENCE, Session};
-use crate::{Commit, Durability, Refusal, Time, Transaction, Version};
+use super::{AttachError, PATIENCE, Session, ring};
+use crate::arena::Arena;
+use crate::{Commit, Durability, Epoch, Refusal, Time, Transaction, Version};
 use iceoryx2::service::port_factory::request_response;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 use std::time::Duration;
 use thiserror::Error;
 
@@ -18,12 +20,12 @@ pub(in crate::shm) const ANSWERS: usize = 2 * MAX_PROCESSES;
 /// Requests of one session that can be under way at once.
 pub(super) const ASKED: usize = 4;
 /// How often an asker looks whether its request has to be sent again.
-const RETRY: Duration = Duration::from_millis(250);
+pub(super) const RETRY: Duration = Duration::from_millis(250);
 /// How long a session looks for an answer before it sleeps, unless told otherwise.
 pub(super) const SPIN: Duration = Duration::from_micros(50);
 
 /// Transactions on their way to the store.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Default, Deserialize)]
 pub(in crate::shm) struct Request {
     /// Which session asks.
     pub(in crate::shm) client: u64,
@@ -46,6 +48,15 @@ struct Asked<'a> {
     process: u32,
     time: Time,
     transactions: &'a [Transaction],
+}
+
+/// The store that a request is for.
+#[derive(Debug)]
+pub(super) struct Aim {
+    pub(super) epoch: Epoch,
+    pub(super) arena: Arc<Arena>,
+    /// The first life of the store that its graph goes back to.
+    lineage: u64,
 }
 
 /// Requests and answers are bytes: see [`Request`].
@@ -103,11 +114,17 @@ impl Session {
     /// # Errors
     /// [`CommitError`].
     pub fn commit(&mut self, transaction: &Transaction, time: Time) -> Result<Commit, CommitError> {
-        let answers = self.commit_each(std::slice::from_ref(transaction), time)?;
-        let Some(answer) = answers.into_iter().next() else {
-            return Err(InstanceError::Ipc("the store gave no answer".to_owned()).into());
+        self.sequence += 1;
+        let aim = self.aim()?;
+        let outcome = match self.ask_by_desk(&aim, transaction, time)? {
+            Some(outcome) => outcome,
+            None => {
+                let answers = self.ask_by_message(aim, std::slice::from_ref(transaction), time)?;
+                let alone = answers.into_iter().next();
+                alone.ok_or_else(|| InstanceError::Ipc("the store gave no answer".to_owned()))?
+            }
         };
-        let commit = answer?;
+        let commit = outcome?;
         if transaction.durability == Durability::OnDisk && !commit.durable {
             let version = commit.version;
             return Err(CommitError::NotDurable { version });
@@ -128,6 +145,28 @@ impl Session {
         time: Time,
     ) -> Result<Vec<Result<Commit, Refusal>>, CommitError> {
         self.sequence += 1;
+        let aim = self.aim()?;
+        self.ask_by_message(aim, transactions, time)
+    }
+
+    /// The store that is asked now.
+    fn aim(&mut self) -> Result<Aim, CommitError> {
+        let (epoch, arena) = self.arena()?.ok_or_else(|| self.no_store())?;
+        let lineage = self.lineage(epoch, &arena)?;
+        Ok(Aim {
+            epoch,
+            arena,
+            lineage,
+        })
+    }
+
+    /// Asks by a message, under the number of the last request.
+    fn ask_by_message(
+        &mut self,
+        aim: Aim,
+        transactions: &[Transaction],
+        time: Time,
+    ) -> Result<Vec<Result<Commit, Refusal>>, CommitError> {
         let mut bytes = std::mem::take(&mut self.scratch);
         bytes.clear();
         let request = Asked {
@@ -140,7 +179,7 @@ impl Session {
         };
         let bytes =
             postcard::to_extend(&request, bytes).map_err(|e| ipc("encoding a request", e))?;
-        let answer = self.ask(&bytes, transactions.len() == 1);
+        let answer = self.ask(aim, &bytes, transactions.len() == 1);
         self.scratch = bytes;
         let answers = answer?;
         if answers.len() != transactions.len() {
@@ -153,24 +192,32 @@ impl Session {
     /// that one knows whether it was applied.
     fn ask(
         &mut self,
+        mut aim: Aim,
         request: &[u8],
         is_known: bool,
     ) -> Result<Vec<Result<Commit, Refusal>>, CommitError> {
-        let lineage = self.lineage()?;
-        let (mut epoch, mut arena) = self.arena()?.ok_or_else(|| self.no_store())?;
         let deadline = now() + PATIENCE;
         while now() < deadline {
+            // A store that is about to show itself is waited for.
+            if let Some((epoch, arena)) = self.arena()?
+                && epoch != aim.epoch
+            {
+                if !is_known || self.lineage(epoch, &arena)? != aim.lineage {
+                    return Err(CommitError::StoreRestarted);
+                }
+                (aim.epoch, aim.arena) = (epoch, arena);
+            }
             let loan = self.client.loan_slice_uninit(request.len());
             let loan = loan.map_err(|e| ipc("sending a request", e))?;
             let pending = loan.write_from_slice(request).send();
             let pending = pending.map_err(|e| ipc("sending a request", e))?;
-            let asleep = arena.is_asleep();
+            let asleep = aim.arena.is_asleep();
             if asleep {
-                self.ring();
+                ring(&self.wake_store);
             }
             let sent = now();
             loop {
-                let heard = bell::listen(&arena);
+                let heard = bell::listen(&aim.arena);
                 if let Some(answer) = pending
                     .receive()
                     .map_err(|e| ipc("the store's answer", e))?
@@ -187,16 +234,7 @@ impl Session {
                 let Some(left) = RETRY.checked_sub(waited) else {
                     break;
                 };
-                bell::sleep(&arena, heard, left);
-            }
-            // A store that is about to show itself is waited for.
-            if let Some((newest, memory)) = self.arena()?
-                && newest != epoch
-            {
-                if !is_known || self.lineage()? != lineage {
-                    return Err(CommitError::StoreRestarted);
-                }
-                (epoch, arena) = (newest, memory);
+                bell::sleep(&aim.arena, heard, left);
             }
         }
         Err(CommitError::NoAnswer)
