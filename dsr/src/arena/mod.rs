@@ -9,6 +9,8 @@
 //! reads, then looks at `oldest`: if its version is not older, all that it read was genuine.
 
 pub(crate) mod allocator;
+#[cfg(test)]
+pub(crate) mod journal;
 pub(crate) mod record;
 pub(crate) mod table;
 pub(crate) mod tree;
@@ -31,12 +33,16 @@ impl Word {
         self.0.load(Ordering::Relaxed)
     }
     pub(crate) fn store(&self, value: u64) {
+        #[cfg(test)]
+        journal::note(self, value);
         self.0.store(value, Ordering::Relaxed);
     }
     pub(crate) fn load_acquire(&self) -> u64 {
         self.0.load(Ordering::Acquire)
     }
     pub(crate) fn store_release(&self, value: u64) {
+        #[cfg(test)]
+        journal::note(self, value);
         self.0.store(value, Ordering::Release);
     }
 }

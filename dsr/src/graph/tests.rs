@@ -1,6 +1,7 @@
 //! The graph against a naive model of it: whatever transactions come, every version that can still
 //! be read says what the model said at that version, and a refused transaction changes nothing.
 
+mod cut;
 mod indices;
 mod retype;
 
