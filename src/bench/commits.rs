@@ -8,7 +8,7 @@ use crate::Failure;
 use dsr::{BareClient, NodeId, Session, Time, Transaction, Value};
 use std::time::{Duration, Instant};
 
-fn set(node: u64, value: f64) -> Transaction {
+pub(super) fn set(node: u64, value: f64) -> Transaction {
     let mut transaction = Transaction::new();
     transaction.set(NodeId(1 + node % NODES), "a", value);
     transaction
@@ -38,7 +38,7 @@ fn answered(came: bool) -> Result<(), Failure> {
     }
 }
 
-fn commit(session: &mut Session, transaction: &Transaction) -> Result<(), Failure> {
+pub(super) fn commit(session: &mut Session, transaction: &Transaction) -> Result<(), Failure> {
     let commit = session.commit(transaction, Time::default());
     commit.map(|_| ()).map_err(Failure::internal)
 }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::fs;
 
 /// The names of the graph's figures, in the order in which they are told.
-const ORDER: [&str; 11] = [
+const ORDER: [&str; 13] = [
     "commit_ack_poll",
     "visible_poll",
     "commit_ack_block",
@@ -17,6 +17,8 @@ const ORDER: [&str; 11] = [
     "private_memory_per_agent",
     "torn_reads",
     "hot_pose_visible",
+    "commit_ack_beside_stopped",
+    "commit_ack_beside_killed",
 ];
 
 /// One measured quantity.

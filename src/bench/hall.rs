@@ -2,6 +2,7 @@
 
 use crate::Failure;
 use dsr::{Instance, Session};
+use rustix::process::{Pid, Signal};
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -115,6 +116,12 @@ impl Peer {
         numbers
             .try_into()
             .map_err(|_| Failure::internal(format!("the {} said `{line}`", self.role)))
+    }
+
+    /// Stops it where it is.
+    pub(super) fn stop(&self) -> Result<(), Failure> {
+        let process = Pid::from_child(&self.child);
+        rustix::process::kill_process(process, Signal::STOP).map_err(Failure::internal)
     }
 
     /// Ends its input, and waits for its end.

@@ -10,6 +10,7 @@
     reason = "measuring takes the host's clock"
 )]
 
+mod beside;
 mod commits;
 mod figure;
 mod hall;
@@ -87,6 +88,7 @@ pub(crate) fn graph(effort: Effort) -> Result<Vec<Figure>, Failure> {
         reads::all(&hall, effort, &mut figures)?;
         commits::flat_out(&hall, effort, raw, &mut figures)?;
         commits::hot(&hall, effort, raw, &mut figures)?;
+        beside::all(&hall, effort, &mut figures)?;
         store.end()?;
     }
     {

@@ -3,8 +3,8 @@
 
 use crate::{Answer, Failure};
 use dsr::{
-    BareServer, Instance, Limits, NodeId, Owner, ReadError, Schema, Session, Snapshot, Store, Time,
-    Transaction, Value,
+    BareServer, Filter, Instance, Limits, NodeId, Owner, ReadError, Schema, Session, Snapshot,
+    Store, Time, Transaction, Value,
 };
 use nalgebra::{Isometry2, Vector2};
 use std::io::{Read, Write};
@@ -35,6 +35,7 @@ pub(crate) fn play(role: &str, instance: &str, numbers: &[u64]) -> Result<Answer
         "stamp" => stamp(&instance, number(0)),
         "pose" => pose(&instance),
         "reader" => reader(&instance),
+        "follow" => follow(&instance),
         "join" => join(&instance, false),
         "copy" => join(&instance, true),
         "pairs" => pairs(&instance),
@@ -204,6 +205,26 @@ fn reader(instance: &Instance) -> Result<(), Failure> {
         let value = found.map(|node| node.value("a")).transpose();
         value.map_err(Failure::internal)?;
         std::thread::sleep(Duration::from_millis(1));
+    }
+    Ok(())
+}
+
+/// An agent that follows every commit.
+fn follow(instance: &Instance) -> Result<(), Failure> {
+    let mut session = attach(instance, "follower")?;
+    let changes = session.changes(Filter::default());
+    let mut changes = changes.map_err(Failure::internal)?;
+    let ended = end_of_input();
+    say("ready")?;
+    while !ended.load(Ordering::Acquire) {
+        let waited = changes.wait(Duration::from_millis(20));
+        waited.map_err(Failure::internal)?;
+        let snapshot = session.snapshot().map_err(Failure::internal)?;
+        while changes
+            .next(snapshot.schema())
+            .map_err(Failure::internal)?
+            .is_some()
+        {}
     }
     Ok(())
 }

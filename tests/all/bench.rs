@@ -34,6 +34,8 @@ fn the_graphs_figures_are_all_there_and_no_process_or_memory_of_theirs_is_left()
             "private_memory_per_agent",
             "torn_reads",
             "hot_pose_visible",
+            "commit_ack_beside_stopped",
+            "commit_ack_beside_killed",
         ]
     );
     for figure in &figures {
