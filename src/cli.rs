@@ -76,6 +76,19 @@ pub(crate) enum Verb {
         after_help = "Examples:\n  cortex experiment list\n  cortex experiment fd-table1 --json"
     )]
     Experiment(Experiment),
+    /// Tell what on this host keeps instances from running well, and what to do about it
+    #[command(after_help = "Example:\n  cortex doctor --mend")]
+    Doctor(Doctor),
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Doctor {
+    /// Remove what is left of instances of which no process runs, and close what others can open
+    #[arg(long)]
+    pub(crate) mend: bool,
+    /// For machines
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// Which running system.

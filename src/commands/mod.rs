@@ -2,6 +2,7 @@
 
 mod agent;
 mod bench;
+mod doctor;
 mod experiment;
 mod graph;
 mod mission;
@@ -41,6 +42,7 @@ pub(crate) fn perform(verb: Verb) -> Result<Answer, Failure> {
         }
         Verb::Social(arguments) => social::run(&arguments),
         Verb::Experiment(arguments) => experiment::run(&arguments),
+        Verb::Doctor(arguments) => doctor::run(&arguments),
     }
 }
 

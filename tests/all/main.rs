@@ -9,6 +9,7 @@ mod algorithms;
 mod architecture;
 mod bench;
 mod dependencies;
+mod doctor;
 mod documentation;
 mod examples;
 mod faults;

@@ -223,7 +223,7 @@ impl Cleaner {
         let clean = move || match clean(&config, || Gate::of(&config)) {
             Ok((0, 0)) => {}
             Ok((cleaned, failed)) => {
-                tracing::info!("dead processes: {cleaned} cleaned up after, {failed} not");
+                tracing::debug!("dead processes: {cleaned} cleaned up after, {failed} not");
             }
             Err(error) => tracing::warn!("cleaning up after dead processes: {error}"),
         };

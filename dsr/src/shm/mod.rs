@@ -125,16 +125,47 @@ impl Instance {
         if name.is_empty() || name.len() > 40 || !name.chars().all(good) {
             return Err(InstanceError::BadName(name.to_owned()));
         }
-        let base = ["CORTEX_RUNTIME_DIR", "XDG_RUNTIME_DIR"]
+        Self::within(&Self::base(), name)
+    }
+
+    /// The instances of the current user that have files, by their names.
+    ///
+    /// # Errors
+    /// [`InstanceError::Io`] where their folder cannot be listed.
+    pub fn all() -> Result<Vec<Self>, InstanceError> {
+        let folder = Self::of_user(&Self::base());
+        let entries = match fs::read_dir(&folder) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+            other => other.map_err(|source| InstanceError::Io {
+                path: folder,
+                source,
+            })?,
+        };
+        let mut all: Vec<Self> = entries
+            .flatten()
+            .filter(|entry| entry.path().is_dir())
+            .filter_map(|entry| Self::new(entry.file_name().to_str()?).ok())
+            .collect();
+        all.sort_by(|a, b| a.name.cmp(&b.name));
+        Ok(all)
+    }
+
+    /// Where the folders of users are.
+    fn base() -> PathBuf {
+        ["CORTEX_RUNTIME_DIR", "XDG_RUNTIME_DIR"]
             .iter()
             .find_map(|variable| std::env::var_os(variable).filter(|path| !path.is_empty()))
-            .map_or_else(std::env::temp_dir, PathBuf::from);
-        Self::within(&base, name)
+            .map_or_else(std::env::temp_dir, PathBuf::from)
+    }
+
+    /// The folder of the current user's instances.
+    fn of_user(base: &Path) -> PathBuf {
+        base.join(format!("cortex-{}", rustix::process::getuid().as_raw()))
     }
 
     /// The instance of that name whose files are below `base`.
     fn within(base: &Path, name: &str) -> Result<Self, InstanceError> {
-        let user = base.join(format!("cortex-{}", rustix::process::getuid().as_raw()));
+        let user = Self::of_user(base);
         let instance = Self {
             name: name.to_owned(),
             folder: user.join(name),
@@ -267,6 +298,39 @@ impl Instance {
             path: SHARED_MEMORY.into(),
             source,
         })
+    }
+
+    /// Its files that other users could open: none, unless somebody opened them to others.
+    ///
+    /// # Errors
+    /// [`InstanceError::Io`].
+    pub fn open_to_others(&self) -> Result<Vec<PathBuf>, InstanceError> {
+        let mut files = self.shared_memory()?;
+        files.push(self.folder.clone());
+        files.retain(|path| {
+            fs::symlink_metadata(path).is_ok_and(|file| file.permissions().mode() & 0o077 != 0)
+        });
+        Ok(files)
+    }
+
+    /// Takes from other users the right to open its files.
+    ///
+    /// # Errors
+    /// [`InstanceError::Io`] with the file that cannot be closed.
+    pub fn close_to_others(&self) -> Result<(), InstanceError> {
+        for path in self.open_to_others()? {
+            let closed = fs::symlink_metadata(&path).and_then(|file| {
+                let mode = file.permissions().mode() & 0o700;
+                fs::set_permissions(&path, fs::Permissions::from_mode(mode))
+            });
+            match closed {
+                Err(source) if source.kind() != io::ErrorKind::NotFound => {
+                    return Err(InstanceError::Io { path, source });
+                }
+                _ => {}
+            }
+        }
+        Ok(())
     }
 
     fn config(&self) -> Result<Config, InstanceError> {
