@@ -1,6 +1,6 @@
 //! The cost grid that social mapping makes and navigation plans on. This file owns its geometry:
-//! which cell a point lies in and where a cell's centre is, the same for writer and reader; and its
-//! bytes between processes, of which a reader survives any.
+//! which cell a point lies in and where a cell's centre is, the same for writer and reader; and it
+//! guarantees that what is no grid is refused.
 
 use nalgebra::Point2;
 
@@ -72,43 +72,29 @@ impl CostGrid {
     }
 }
 
-/// The first bytes of every grid: its name and the version of the layout.
-const MAGIC: [u8; 8] = *b"cgrid\0\0\x01";
-/// Bytes before the costs.
-const HEADER: usize = 48;
-
-/// Why bytes are no grid.
+/// Why numbers are no grid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum GridDecodeError {
-    /// They end within the header.
-    #[error("a grid's header has {HEADER} bytes, here are {found}")]
-    Short {
-        /// How many there are.
-        found: usize,
-    },
-    /// They do not begin with the mark of this layout.
-    #[error("the bytes are not a grid of this version")]
-    Magic,
-    /// The header's geometry is impossible: no cells, no finite origin or no positive resolution.
+pub enum GridError {
+    /// The geometry is impossible: no cells, no finite origin or no positive resolution.
     #[error("a grid of {width} x {height} cells of {resolution} m from {origin} is impossible")]
     Geometry {
         /// Columns.
-        width: u64,
+        width: usize,
         /// Rows.
-        height: u64,
+        height: usize,
         /// Side of a cell, metres.
         resolution: f64,
         /// Lower left corner.
         origin: Point2<f64>,
     },
-    /// The header announces another number of costs than follow.
-    #[error("{width} x {height} cells need four bytes each, but {found} bytes follow the header")]
+    /// There are more or fewer costs than cells.
+    #[error("{width} x {height} cells need a cost each, but here are {found}")]
     Length {
         /// Columns.
-        width: u64,
+        width: usize,
         /// Rows.
-        height: u64,
-        /// How many follow.
+        height: usize,
+        /// How many costs there are.
         found: usize,
     },
     /// A cost is below 1 or not a number.
@@ -122,65 +108,39 @@ pub enum GridDecodeError {
 }
 
 impl CostGrid {
-    /// The grid as bytes, all little endian: the magic `"cgrid\0\0\x01"`, width and height (u64),
-    /// origin x and y and resolution (f64), then the costs (f32) row by row.
-    pub fn to_bytes(&self) -> Vec<u8> {
-        let mut bytes = Vec::with_capacity(HEADER + 4 * self.costs.len());
-        bytes.extend(MAGIC);
-        bytes.extend((self.width as u64).to_le_bytes());
-        bytes.extend((self.height as u64).to_le_bytes());
-        for value in [self.origin.x, self.origin.y, self.resolution] {
-            bytes.extend(value.to_le_bytes());
-        }
-        bytes.extend(self.costs.iter().flat_map(|cost| cost.to_le_bytes()));
-        bytes
-    }
-
-    /// The grid that [`Self::to_bytes`] wrote.
+    /// The grid of `width` columns whose cell (0, 0) has its lower left corner at `origin` (world
+    /// frame, metres), with the costs of the cells row by row from the lowest y.
     ///
     /// # Errors
-    /// [`GridDecodeError`] for any other bytes; nothing is allocated before the lengths agree.
-    pub fn from_bytes(bytes: &[u8]) -> Result<Self, GridDecodeError> {
-        let (header, costs) = bytes
-            .split_at_checked(HEADER)
-            .ok_or(GridDecodeError::Short { found: bytes.len() })?;
-        let (words, _) = header.as_chunks::<8>();
-        let [magic, width, height, x, y, resolution] = *words else {
-            return Err(GridDecodeError::Short { found: bytes.len() });
-        };
-        if magic != MAGIC {
-            return Err(GridDecodeError::Magic);
-        }
-        let (width, height) = (u64::from_le_bytes(width), u64::from_le_bytes(height));
-        let origin = Point2::new(f64::from_le_bytes(x), f64::from_le_bytes(y));
-        let resolution = f64::from_le_bytes(resolution);
+    /// [`GridError`] for what no [`CostGrid`] is.
+    pub fn new(
+        origin: Point2<f64>,
+        resolution: f64,
+        [height, width]: [usize; 2],
+        costs: &[f32],
+    ) -> Result<Self, GridError> {
         let positive = resolution.is_finite() && resolution > 0.0;
         if width == 0 || height == 0 || !origin.iter().all(|c| c.is_finite()) || !positive {
-            return Err(GridDecodeError::Geometry {
+            return Err(GridError::Geometry {
                 width,
                 height,
                 resolution,
                 origin,
             });
         }
-        let expected = width
-            .checked_mul(height)
-            .and_then(|cells| cells.checked_mul(4));
-        if expected != Some(costs.len() as u64) {
-            return Err(GridDecodeError::Length {
+        if width.checked_mul(height) != Some(costs.len()) {
+            return Err(GridError::Length {
                 width,
                 height,
                 found: costs.len(),
             });
         }
-        let (costs, _) = costs.as_chunks::<4>();
-        let costs: Vec<f32> = costs.iter().map(|cost| f32::from_le_bytes(*cost)).collect();
         // Written so that a NaN is refused as well.
         if let Some(index) = costs
             .iter()
             .position(|cost| !matches!(cost, FREE..=BLOCKED))
         {
-            return Err(GridDecodeError::Cost {
+            return Err(GridError::Cost {
                 index,
                 cost: costs[index],
             });
@@ -188,83 +148,48 @@ impl CostGrid {
         Ok(Self {
             origin,
             resolution,
-            width: width as usize,
-            height: height as usize,
-            costs,
+            width,
+            height,
+            costs: costs.to_vec(),
         })
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::GridDecodeError as E;
+    use super::GridError as E;
     use super::*;
-    use proptest::prelude::*;
 
     #[test]
-    fn bytes_that_are_no_grid_are_refused_for_what_is_wrong() {
-        let good = CostGrid::covering([0.0, 0.0, 0.4, 0.2], 0.1).to_bytes();
-        let with = |at: usize, new: &[u8]| {
-            let mut bytes = good.clone();
-            bytes[at..at + new.len()].copy_from_slice(new);
-            CostGrid::from_bytes(&bytes).unwrap_err()
+    fn numbers_that_are_no_grid_are_refused_for_what_is_wrong() {
+        let costs = CostGrid::covering([0.0, 0.0, 0.4, 0.2], 0.1).costs;
+        let new = |origin, resolution, shape, costs: &[f32]| {
+            CostGrid::new(origin, resolution, shape, costs).unwrap_err()
         };
-        assert_eq!(
-            CostGrid::from_bytes(&good[..47]),
-            Err(E::Short { found: 47 })
-        );
-        assert_eq!(with(7, &[2]), E::Magic);
-        assert!(matches!(
-            with(8, &0u64.to_le_bytes()),
-            E::Geometry { width: 0, .. }
-        ));
-        assert!(matches!(
-            with(24, &f64::NAN.to_le_bytes()),
-            E::Geometry { .. }
-        ));
-        assert!(matches!(
-            with(40, &(-0.1f64).to_le_bytes()),
-            E::Geometry { .. }
-        ));
-        assert!(matches!(
-            with(8, &u64::MAX.to_le_bytes()),
-            E::Length { found: 32, .. }
-        ));
-        assert!(matches!(
-            CostGrid::from_bytes(&good[..good.len() - 1]),
-            Err(E::Length { .. })
-        ));
+        let origin = Point2::origin();
+        let geometry = |error| matches!(error, E::Geometry { .. });
+        assert!(geometry(new(origin, 0.1, [2, 0], &costs)));
+        assert!(geometry(new(origin, 0.1, [0, 4], &[])));
+        assert!(geometry(new(
+            Point2::new(f64::NAN, 0.0),
+            0.1,
+            [2, 4],
+            &costs
+        )));
+        assert!(geometry(new(origin, -0.1, [2, 4], &costs)));
+        let length = |error| matches!(error, E::Length { found: 8, .. });
+        assert!(length(new(origin, 0.1, [2, 5], &costs)));
+        assert!(length(new(origin, 0.1, [usize::MAX, 2], &costs)));
         for cost in [f32::NAN, 0.5, -1.0, f32::NEG_INFINITY] {
+            let mut costs = costs.clone();
+            costs[2] = cost;
             assert!(matches!(
-                with(48 + 8, &cost.to_le_bytes()),
+                new(origin, 0.1, [2, 4], &costs),
                 E::Cost { index: 2, .. }
             ));
         }
-    }
-
-    proptest! {
-        #[test]
-        fn decoding_undoes_encoding(
-            (width, costs) in (1usize..20, 1usize..20).prop_flat_map(|(width, height)| {
-                let cost = prop_oneof![Just(BLOCKED), Just(FREE), 1.0f32..10.0];
-                (Just(width), prop::collection::vec(cost, width * height))
-            }),
-            x in -1e3..1e3f64, y in -1e3..1e3f64, resolution in 0.01..1.0f64,
-        ) {
-            let height = costs.len() / width;
-            let grid = CostGrid { origin: Point2::new(x, y), resolution, width, height, costs };
-            prop_assert_eq!(CostGrid::from_bytes(&grid.to_bytes()), Ok(grid));
-        }
-
-        #[test]
-        fn any_bytes_are_survived(mut bytes in prop::collection::vec(any::<u8>(), 0..200), known: bool) {
-            if known && bytes.len() >= 8 {
-                bytes[..8].copy_from_slice(&MAGIC);
-            }
-            if let Ok(grid) = CostGrid::from_bytes(&bytes) {
-                prop_assert_eq!(grid.to_bytes(), bytes);
-            }
-        }
+        let grid = CostGrid::new(origin, 0.1, [2, 4], &costs).unwrap();
+        assert_eq!(grid, CostGrid::covering([0.0, 0.0, 0.4, 0.2], 0.1));
     }
 
     #[test]

@@ -57,6 +57,7 @@ pub(crate) fn has_fixed_size(kind: ValueKind) -> bool {
             | ValueKind::F32List
             | ValueKind::U8List
             | ValueKind::U64List
+            | ValueKind::Large
     )
 }
 

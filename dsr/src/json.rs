@@ -11,7 +11,7 @@
 //! other is `{"type":KIND,"value":...}` with a kind of [`ValueKind::name`]. Whole `f64` have a
 //! decimal point. `u64` are strings, for most programs read JSON numbers as `f64`.
 
-use crate::{Pose, ReadError, Snapshot, Value, ValueKind};
+use crate::{LargeHandle, Pose, ReadError, Snapshot, Value, ValueKind};
 use nalgebra::{Isometry2, Quaternion, Translation3, UnitQuaternion, Vector2};
 use serde::Serialize;
 use serde_json::{Map, Value as Json, json};
@@ -68,12 +68,19 @@ pub fn value_to_json(value: &Value) -> Json {
             let (t, q) = (pose.translation.vector, pose.rotation.coords);
             typed(json!({"translation": [t.x, t.y, t.z], "rotation": [q.x, q.y, q.z, q.w]}))
         }
+        Value::Large(handle) => typed(json!({
+            "stream": handle.stream().to_string(),
+            "sequence": handle.sequence().to_string(),
+            "bytes": handle.bytes().to_string(),
+            "shape": handle.shape(),
+        })),
     }
 }
 
 /// A value from JSON: the inverse of [`value_to_json`]. A plain whole number is an `i64` and a
 /// plain array of numbers an `f64` vector (up to 6) or list, unless `expected` says otherwise. A pose
-/// may also be an array: translation and rotation (i, j, k, w), or x, y and heading on the floor.
+/// may also be an array: translation and rotation (i, j, k, w), or x, y and heading on the floor; so may
+/// the handle of a large value: its words in the arena.
 ///
 /// # Errors
 /// What is wrong, in words.
@@ -173,6 +180,18 @@ fn decode(kind: ValueKind, json: &Json) -> Option<Value> {
                 UnitQuaternion::try_new(quaternion, 1e-9)?
             };
             Value::Pose(Pose::from_parts(Translation3::new(x, y, z), rotation))
+        }
+        ValueKind::Large => {
+            if let Json::Array(row) = json {
+                let words: Option<Vec<u64>> = row.iter().map(natural).collect();
+                return Some(LargeHandle::from_words(words?.try_into().ok()?).into());
+            }
+            let field = |name: &str| natural(json.get(name)?);
+            let lengths = json.get("shape").and_then(Json::as_array)?.iter();
+            let lengths = lengths.map(|length| u32::try_from(length.as_u64()?).ok());
+            let shape = lengths.collect::<Option<Vec<u32>>>()?;
+            let (stream, sequence) = (field("stream")?, field("sequence")?);
+            Value::Large(LargeHandle::new(stream, sequence, field("bytes")?, &shape)?)
         }
     })
 }

@@ -16,6 +16,7 @@ mod hot;
 mod ids;
 pub mod interchange;
 pub mod json;
+mod large;
 mod process;
 mod rights;
 mod schema;
@@ -36,6 +37,7 @@ pub use change::{Change, EdgeChange, Filter, NodeChange, RuleApplication, Touch}
 pub use difference::{Difference, bring_over, differences};
 pub use graph::{Graph, Image, LeaseRefusal, Limits, RuleEngine, TransactionId, decode_image};
 pub use ids::{AttributeId, EdgeKey, Epoch, LabelId, NodeId, TypeId, Version, WriterId};
+pub use large::{LargeHandle, LargeType, Number, NumberKind};
 pub use process::{Begin, Pace, TurnError, Turns, done_line, turn_line};
 pub use rights::{Manifest, ManifestError, Rights};
 pub use schema::{
@@ -43,8 +45,8 @@ pub use schema::{
 };
 pub use shm::{
     AttachError, BareClient, BareServer, Changes, ClockError, CommitError, HotAttribute, HotError,
-    Instance, InstanceError, Lease, LeaseError, Publisher, Session, Store, StoreError, Subscriber,
-    Tick, Update,
+    Instance, InstanceError, LargeAttribute, LargeError, LargeLoan, LargeReadError, LargeSample,
+    Lease, LeaseError, Publisher, Session, Store, StoreError, Subscriber, Tick, Update,
 };
 pub use snapshot::{
     Attribute, Edge, Edges, Element, Neighbors, Node, NodeIds, Snapshot, TransformError,

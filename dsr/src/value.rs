@@ -1,6 +1,7 @@
 //! What an attribute can hold. This file owns the kinds of value and their names in files and
 //! messages; the arena and the wire know how to store each of them without loss.
 
+use crate::LargeHandle;
 use nalgebra::{Isometry2, Isometry3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -56,6 +57,8 @@ pub enum Value {
     U64List(Vec<u64>),
     /// A pose in space.
     Pose(Pose),
+    /// What leads to a value that lies beside the graph.
+    Large(LargeHandle),
 }
 
 /// Which kind of [`Value`].
@@ -81,11 +84,12 @@ pub enum ValueKind {
     U8List,
     U64List,
     Pose,
+    Large,
 }
 
 impl ValueKind {
     /// All kinds, in the order of their codes in the arena.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::Bool,
         Self::I32,
         Self::U32,
@@ -101,6 +105,7 @@ impl ValueKind {
         Self::U8List,
         Self::U64List,
         Self::Pose,
+        Self::Large,
     ];
 
     /// The kind's name in schema files, graph JSON and messages.
@@ -121,6 +126,7 @@ impl ValueKind {
             Self::U8List => "u8_list",
             Self::U64List => "u64_list",
             Self::Pose => "pose",
+            Self::Large => "large",
         }
     }
 
@@ -187,6 +193,7 @@ impl Value {
             Self::U8List(_) => ValueKind::U8List,
             Self::U64List(_) => ValueKind::U64List,
             Self::Pose(_) => ValueKind::Pose,
+            Self::Large(_) => ValueKind::Large,
         }
     }
 
@@ -247,6 +254,15 @@ impl Value {
             None
         }
     }
+
+    /// The value as the handle of a large value, if it is one.
+    pub fn as_large(&self) -> Option<&LargeHandle> {
+        if let Self::Large(handle) = self {
+            Some(handle)
+        } else {
+            None
+        }
+    }
 }
 
 macro_rules! from {
@@ -258,7 +274,8 @@ macro_rules! from {
         }
     )*};
 }
-from!(bool => Bool, i64 => I64, u64 => U64, f64 => F64, String => String, Pose => Pose);
+from!(bool => Bool, i64 => I64, u64 => U64, f64 => F64, String => String, Pose => Pose,
+    LargeHandle => Large);
 
 impl From<&str> for Value {
     fn from(text: &str) -> Self {

@@ -45,6 +45,9 @@ pub(crate) enum GraphAction {
     Get {
         /// NODE, NODE.ATTRIBUTE, FROM-LABEL->TO or FROM-LABEL->TO.ATTRIBUTE
         path: String,
+        /// Writes a large value itself, byte by byte, instead of printing its handle
+        #[arg(long, value_name = "FILE", conflicts_with = "file")]
+        bytes: Option<PathBuf>,
     },
     /// Set one attribute of a running system, or in a file
     #[command(

@@ -97,6 +97,7 @@ pub(crate) fn value_text(value: &Value) -> String {
             let row: Vec<String> = row.iter().map(|x| format!("{x:.3}")).collect();
             format!("[{}]", row.join(", "))
         }
+        Value::Large(handle) => handle.to_string(),
         Value::U8List(bytes) => format!("{bytes:?}"),
         Value::U64List(row) => format!("{row:?}"),
         Value::Bool(_) | Value::I64(_) | Value::String(_) => json::value_to_json(value).to_string(),

@@ -123,9 +123,14 @@ fn every_kind_of_value_is_described() {
 }
 
 #[test]
-fn the_agent_of_the_tutorial_is_the_one_that_is_compiled() {
-    let example = tree::read("dsr/examples/careful.rs");
-    for text in blocks("your-own-agent", "rust") {
-        assert!(example.contains(&text), "dsr/examples/careful.rs differs");
+fn the_programs_that_pages_show_are_those_that_are_compiled() {
+    for (page, example) in [
+        ("your-own-agent", "dsr/examples/careful.rs"),
+        ("shared-graph", "dsr/examples/scan.rs"),
+    ] {
+        let program = tree::read(example);
+        for text in blocks(page, "rust") {
+            assert!(program.contains(&text), "{example} differs");
+        }
     }
 }

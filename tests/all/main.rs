@@ -16,6 +16,7 @@ mod faults;
 mod graph;
 mod hostile;
 mod hot;
+mod large;
 mod leftovers;
 mod live_rules;
 mod missions;

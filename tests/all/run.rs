@@ -232,6 +232,16 @@ fn the_live_graph_is_shown_from_another_terminal() {
             .unwrap()
             .contains("did you mean `robot`?")
     );
+    // What the robot plans on is in the graph too, for whoever likes to look at it.
+    let file = run.folder().join("grid.f32");
+    let path = file.to_str().unwrap();
+    let grid = ["graph", "get", "world.social_grid", "--bytes", path];
+    let saved = Program::run(&[&grid[..], &["--instance", &name]].concat());
+    assert!(saved.status.success(), "{saved:?}");
+    let bytes = fs::read(&file).unwrap();
+    let (costs, rest) = bytes.as_chunks::<4>();
+    assert!(!costs.is_empty() && rest.is_empty());
+    assert!(costs.iter().all(|cost| f32::from_le_bytes(*cost) >= 1.0));
     let json = Program::run(&["graph", "export", "json", "--instance", &name]);
     let json: Value = serde_json::from_slice(&json.stdout).unwrap();
     assert_eq!(json["format"], "dsr/1");

@@ -7,6 +7,7 @@
 )]
 
 mod fill;
+mod large;
 
 use dsr::{
     Durability, Instance, ReadError, Schema, Session, Snapshot, State, Store, Time, Transaction,
@@ -31,6 +32,10 @@ fn main() -> Outcome {
     let instance = Instance::new(instance)?;
     let number = |index: usize| rest.get(index).map_or(Ok(0), |text| text.parse::<u64>());
     match role.as_str() {
+        "large-store" => large::store(&instance),
+        "large-camera" => large::camera(&instance),
+        "large-still" => large::still(&instance),
+        "large-watch" => large::watch(&instance),
         "hot-store" => hot_store(&instance),
         "hot-owner" => hot_owner(&instance),
         "store" => store(&instance, rest.first()),

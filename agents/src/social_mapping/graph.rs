@@ -27,9 +27,6 @@ pub const USAGE: &str = "usage";
 const MOVED: f64 = 0.05;
 /// ... or turned further than this, radians.
 const TURNED: f64 = 5.0 * std::f64::consts::PI / 180.0;
-/// The grid is given out again after this time though nothing changed, seconds: whoever reads it
-/// may have been restarted.
-const REPEAT: f64 = 1.0;
 
 /// Why no scene could be read from the graph.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -358,7 +355,7 @@ fn is_near(old: &[Point2<f64>], new: &[Point2<f64>]) -> bool {
 /// What a turn brought.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Turn {
-    /// The grid, where it changed or was last given out a second ago.
+    /// The grid, where it changed.
     pub grid: Option<Arc<CostGrid>>,
     /// What to write into the graph; often nothing.
     pub transaction: Transaction,
@@ -372,7 +369,6 @@ pub struct SocialMapping {
     mapper: SocialMapper,
     period: f64,
     updated: Option<Time>,
-    sent: Option<Time>,
     unsent: bool,
     rejected: Vec<Rejection>,
 }
@@ -388,7 +384,6 @@ impl SocialMapping {
             mapper,
             period,
             updated: None,
-            sent: None,
             unsent: false,
             rejected: Vec::new(),
         })
@@ -407,11 +402,7 @@ impl SocialMapping {
         self.unsent |= update.changed;
         let transaction = transaction(&update, snapshot).map_err(ReadError::from)?;
         self.updated = Some(now);
-        let send = self.unsent || is_due(self.sent, now, REPEAT);
-        if send {
-            self.sent = Some(now);
-            self.unsent = false;
-        }
+        let send = std::mem::take(&mut self.unsent);
         let rejected = if update.rejected == self.rejected {
             Vec::new()
         } else {

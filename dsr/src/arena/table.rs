@@ -10,6 +10,7 @@
 
 use super::record::{pack, unpack};
 use super::{Address, Arena, Word};
+use crate::large::{HANDLE_WORDS, LargeHandle};
 use crate::value::{Pose, Value, ValueKind};
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 
@@ -396,6 +397,10 @@ fn encode_value(words: &mut Vec<u64>, value: &Value) -> usize {
             words.extend(pose_words(pose));
             return 7;
         }
+        Value::Large(handle) => {
+            words.extend(handle.to_words());
+            return HANDLE_WORDS;
+        }
     };
     words.push(word);
     1
@@ -412,6 +417,7 @@ fn value_words(kind: u16, length: usize) -> Option<usize> {
         ValueKind::F32Vector | ValueKind::F32List => length.div_ceil(2),
         ValueKind::Vector | ValueKind::F64List | ValueKind::U64List => length,
         ValueKind::Pose => 7,
+        ValueKind::Large => HANDLE_WORDS,
         _ => 1,
     })
 }
@@ -441,6 +447,10 @@ fn decode_value<W: Load>(kind: u16, length: usize, words: &[W]) -> Option<Value>
         ValueKind::U8List => Value::U8List(unpack(words, length)?),
         ValueKind::U64List => Value::U64List(words.get(..length)?.iter().map(Load::get).collect()),
         ValueKind::Pose => Value::Pose(pose_of(words.first_chunk()?)),
+        ValueKind::Large => {
+            let row = words.first_chunk::<HANDLE_WORDS>()?;
+            Value::Large(LargeHandle::from_words(row.each_ref().map(Load::get)))
+        }
     })
 }
 

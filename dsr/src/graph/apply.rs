@@ -388,6 +388,7 @@ impl<'a> Work<'a> {
                     index: false,
                     history: 0,
                     hot: None,
+                    large: None,
                 };
                 Ok(schema.add_attribute(attribute)?)
             }

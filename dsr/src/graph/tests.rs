@@ -188,6 +188,7 @@ pub(crate) fn value() -> impl Strategy<Value = Value> {
             a
         )
         .into()),
+        crate::large::tests::handle().prop_map(Value::Large),
     ]
 }
 

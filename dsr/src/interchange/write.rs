@@ -213,6 +213,10 @@ fn typed(value: &Value) -> Json {
             let row = [t.x, t.y, t.z, q.x, q.y, q.z, q.w];
             return ours(3, numbers(&row));
         }
+        Value::Large(handle) => {
+            let row = handle.to_words().map(|word| json!(word.to_string()));
+            return ours(9, row.into_iter().collect());
+        }
     };
     json!({"type": number, "value": json})
 }

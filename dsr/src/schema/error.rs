@@ -1,6 +1,6 @@
 //! What a schema does not allow, in words that name the nearest known name.
 
-use crate::ValueKind;
+use crate::{LargeHandle, NumberKind, ValueKind};
 use thiserror::Error;
 
 /// What a name stands for.
@@ -68,6 +68,26 @@ pub enum SchemaError {
         max: f64,
         /// The value.
         value: f64,
+    },
+    /// The large value is longer than the attribute's can be.
+    #[error("`{attribute}` can have {max_bytes} bytes, not {bytes}; see `max_bytes` in the schema")]
+    TooLarge {
+        /// The attribute.
+        attribute: String,
+        /// How long a value can be.
+        max_bytes: u64,
+        /// How long this one is.
+        bytes: u64,
+    },
+    /// The large value's length is not that of the numbers that it should consist of.
+    #[error("`{attribute}` consists of {of}, and this is not so many: {handle}")]
+    WrongShape {
+        /// The attribute.
+        attribute: String,
+        /// What its values consist of.
+        of: NumberKind,
+        /// The value's handle.
+        handle: LargeHandle,
     },
     /// The name cannot be one.
     #[error("`{0}` cannot be a name: names are not empty and at most 255 bytes")]

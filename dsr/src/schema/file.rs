@@ -2,10 +2,11 @@
 //! that every name a schema file uses is defined in it, and points at the one that is not.
 
 use super::{AttributeType, Schema, SchemaError, suggest};
-use crate::{TypeId, ValueKind};
+use crate::{LargeType, NumberKind, TypeId, ValueKind};
 use miette::{Diagnostic, NamedSource, SourceSpan};
 use serde::Deserialize;
 use std::collections::BTreeMap;
+use std::ops::Range;
 use thiserror::Error;
 use toml::Spanned;
 
@@ -60,6 +61,8 @@ struct AttributeRow {
     index: Option<Spanned<bool>>,
     history: Option<Spanned<u64>>,
     hot: Option<Spanned<f64>>,
+    of: Option<Spanned<String>>,
+    max_bytes: Option<Spanned<u64>>,
 }
 
 /// What is wrong with a history of so many values.
@@ -79,18 +82,63 @@ fn why_not_hot(kind: ValueKind, rate: f64) -> Option<String> {
     wrong.then(|| format!("a hot attribute is folded in {least} to {most} times a second"))
 }
 
+/// Why a row cannot be so, where it says so, and what would be right.
+type Wrong = (String, Range<usize>, Option<String>);
+
+fn value_kind(name: &Spanned<String>) -> Result<ValueKind, Wrong> {
+    ValueKind::from_name(name.get_ref()).ok_or_else(|| {
+        let known = ValueKind::ALL.map(ValueKind::name).join(", ");
+        let message = format!("unknown kind of value `{}`", name.get_ref());
+        (message, name.span(), Some(format!("one of {known}")))
+    })
+}
+
+/// What a row says of large values.
+fn large_type(kind: ValueKind, row: &AttributeRow) -> Result<Option<LargeType>, Wrong> {
+    let spans = [
+        row.of.as_ref().map(Spanned::span),
+        row.max_bytes.as_ref().map(Spanned::span),
+    ];
+    if kind != ValueKind::Large {
+        return match spans.into_iter().flatten().next() {
+            None => Ok(None),
+            Some(span) => {
+                let message = format!("a {} is in the graph itself", kind.name());
+                Err((message, span, Some("kind = \"large\" has it".to_owned())))
+            }
+        };
+    }
+    let mut large = LargeType::default();
+    if let Some(asked) = &row.of {
+        large.of = NumberKind::from_name(asked.get_ref()).ok_or_else(|| {
+            let known = NumberKind::ALL.map(NumberKind::name).join(", ");
+            let message = format!("unknown kind of number `{}`", asked.get_ref());
+            (message, asked.span(), Some(format!("one of {known}")))
+        })?;
+    }
+    if let Some(asked) = &row.max_bytes {
+        large.max_bytes = *asked.get_ref();
+        if !(1..=LargeType::MAX_BYTES).contains(&large.max_bytes) {
+            let most = LargeType::MAX_BYTES;
+            let message = format!("a large value has 1 to {most} bytes at the most");
+            return Err((message, asked.span(), None));
+        }
+    }
+    Ok(Some(large))
+}
+
 impl Schema {
     /// Reads a schema file: `types` maps each type to its parents, `labels` each label to the
     /// types it may start `from` and end at (`to`), `attributes` each attribute to its `kind`
-    /// (see [`ValueKind::name`]), `unit`, `min`, `max`, `index`, `history` and `hot`. `open = true` lets
-    /// other names in.
+    /// (see [`ValueKind::name`]), `unit`, `min`, `max`, `index`, `history` and `hot`, and of large values
+    /// `of` and `max_bytes`. `open = true` lets other names in.
     ///
     /// # Errors
     /// Broken TOML, an unknown key, kind or type name, an index of what has no order and is no
-    /// text, a history that is too short or too long, a rate of what cannot be hot; with its place in
-    /// the file.
+    /// text, a history that is too short or too long, a rate of what cannot be hot, large
+    /// values of what is no number; with its place in the file.
     pub fn from_toml(file_name: &str, text: &str) -> Result<Self, SchemaFileError> {
-        let error = |message: String, span: Option<std::ops::Range<usize>>, help| SchemaFileError {
+        let error = |message: String, span: Option<Range<usize>>, help| SchemaFileError {
             message,
             text: NamedSource::new(file_name, text.to_owned()),
             span: span.map(Into::into),
@@ -147,15 +195,10 @@ impl Schema {
                 .map_err(|e| refused(e, name.span()))?;
         }
         for (name, row) in file.attributes {
-            let kind = ValueKind::from_name(row.kind.get_ref()).ok_or_else(|| {
-                let known = ValueKind::ALL.map(ValueKind::name).join(", ");
-                let message = format!("unknown kind of value `{}`", row.kind.get_ref());
-                error(
-                    message,
-                    Some(row.kind.span()),
-                    Some(format!("one of {known}")),
-                )
-            })?;
+            let kind = value_kind(&row.kind)
+                .map_err(|(message, span, help)| error(message, Some(span), help))?;
+            let large = large_type(kind, &row)
+                .map_err(|(message, span, help)| error(message, Some(span), help))?;
             let index = row.index.as_ref().is_some_and(|index| *index.get_ref());
             if let Some(asked) = row.index.filter(|_| index && !kind.can_have_index()) {
                 let message = format!("a {} cannot have an index", kind.name());
@@ -184,6 +227,7 @@ impl Schema {
                 index,
                 history: history as u16,
                 hot,
+                large,
             };
             schema
                 .add_attribute(attribute)
@@ -244,6 +288,24 @@ mod tests {
         );
         let (message, _) = place_of("[attributes]\nx = { kind = \"pose\", hot = 0.0 }\n");
         assert!(message.contains("0.01 to 1000 times a second"), "{message}");
+    }
+
+    #[test]
+    fn what_large_values_cannot_be_is_pointed_at() {
+        let of = |row: &str| place_of(&format!("[attributes]\nx = {{ {row} }}\n"));
+        let (message, place) = of("kind = \"large\", of = \"f23\"");
+        assert_eq!(
+            (message.as_str(), place.as_str()),
+            ("unknown kind of number `f23`", "\"f23\"")
+        );
+        let (message, place) = of("kind = \"large\", max_bytes = 0");
+        assert!(message.contains("1 to 1073741824 bytes"), "{message}");
+        assert_eq!(place, "0");
+        let (message, place) = of("kind = \"u8_list\", max_bytes = 10");
+        assert_eq!(
+            (message.as_str(), place.as_str()),
+            ("a u8_list is in the graph itself", "10")
+        );
     }
 
     #[test]

@@ -8,7 +8,7 @@ mod file;
 pub use error::{NameKind, SchemaError, suggest};
 pub use file::SchemaFileError;
 
-use crate::{AttributeId, LabelId, TypeId, Value, ValueKind};
+use crate::{AttributeId, LabelId, LargeType, TypeId, Value, ValueKind};
 use rustc_hash::FxHashMap;
 use serde::{Deserialize, Serialize};
 
@@ -51,6 +51,8 @@ pub struct AttributeType {
     pub history: u16,
     /// Its owner may give it out beside the graph, and folds it in so many times a second.
     pub hot: Option<f64>,
+    /// What its values are, where they lie beside the graph.
+    pub large: Option<LargeType>,
 }
 
 /// The names a graph may use.
@@ -171,6 +173,11 @@ impl Schema {
     #[inline]
     pub fn hot_rate(&self, attribute: AttributeId) -> Option<f64> {
         self.parts.attributes.get(usize::from(attribute.0))?.hot
+    }
+
+    /// What the attribute's values are, where they lie beside the graph.
+    pub fn large_type(&self, attribute: AttributeId) -> Option<LargeType> {
+        self.parts.attributes.get(usize::from(attribute.0))?.large
     }
 
     /// How many values of the attribute are kept, the newest among them; 0 for no history.
@@ -339,7 +346,7 @@ impl Schema {
     ///
     /// # Errors
     /// [`SchemaError::WrongKind`], [`SchemaError::OutOfRange`] (a number that is not one is
-    /// outside every range).
+    /// outside every range), [`SchemaError::TooLarge`], [`SchemaError::WrongShape`].
     pub fn check_value(&self, attribute: AttributeId, value: &Value) -> Result<(), SchemaError> {
         let Some(rule) = self.parts.attributes.get(usize::from(attribute.0)) else {
             return Ok(());
@@ -352,6 +359,9 @@ impl Schema {
                 expected,
                 found: value.kind(),
             });
+        }
+        if let (Some(large), Value::Large(handle)) = (rule.large, value) {
+            large.check(&rule.name, handle)?;
         }
         if (rule.min.is_some() || rule.max.is_some())
             && let Some(number) = value.as_f64()

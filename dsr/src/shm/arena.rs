@@ -153,8 +153,8 @@ impl Growth for SharedGrowth {
     }
 }
 
-/// Makes sure that `len` words at `start` are backed by memory.
-fn populate(start: *const Word, len: usize) -> rustix::io::Result<()> {
+/// Makes sure that `len` elements at `start`, in shared memory, are backed by memory.
+pub(super) fn populate<T>(start: *const T, len: usize) -> rustix::io::Result<()> {
     let page = rustix::param::page_size();
     let end = start.wrapping_add(len).addr().next_multiple_of(page);
     let first = start.addr() - start.addr() % page;

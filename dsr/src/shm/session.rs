@@ -6,6 +6,7 @@
 mod clock;
 mod commit;
 mod desk;
+mod large;
 mod look;
 
 pub use clock::{ClockError, Tick};
@@ -19,6 +20,7 @@ use desk::Desk;
 use super::arena::ArenaSubscriber;
 use super::changes::Changes;
 use super::hot::{self, HotAttribute, HotError, HotSubscriber};
+use super::large::{OwnStreams, Readers};
 use super::lease::Tenant;
 use super::page::OwnPage;
 use super::{
@@ -105,6 +107,9 @@ pub struct Session {
     hot: Option<HotSubscriber>,
     /// This session's own.
     page: Option<Arc<OwnPage>>,
+    /// The streams of large values, of its own and of others.
+    own_streams: OwnStreams,
+    readers: Readers,
     tenant: Option<Arc<Tenant>>,
     /// Where this session's requests lie, once it has made two.
     desk: Option<Desk>,
@@ -153,10 +158,12 @@ impl Session {
             root: None,
             hot: None,
             page: None,
+            own_streams: OwnStreams::default(),
+            readers: Readers::default(),
             tenant: None,
             desk: None,
             lineage: None,
-            id: new_session_id(),
+            id: unique_number(),
             sequence: 0,
             spin: SPIN,
             scratch: Vec::new(),
@@ -248,6 +255,7 @@ impl Session {
     /// # Errors
     /// [`AttachError`].
     pub fn snapshot(&mut self) -> Result<Snapshot, AttachError> {
+        self.own_streams.serve_newcomers();
         let (epoch, arena) = match self.arena()? {
             Some(found) => found,
             None => {
@@ -433,12 +441,12 @@ fn hot_key(
     }
 }
 
-/// A number that no other session has: the process and the time.
+/// A number that no other session or stream has: the process and the time.
 #[allow(
     clippy::disallowed_methods,
     reason = "tells sessions apart; nothing is computed from it"
 )]
-fn new_session_id() -> u64 {
+fn unique_number() -> u64 {
     let since = SystemTime::now()
         .duration_since(UNIX_EPOCH)
         .unwrap_or_default();

@@ -25,7 +25,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// What the rows mean; another number is another meaning.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 /// The database's name in the folder.
 const FILE: &str = "graph.redb";
 /// The name of one that is being made.

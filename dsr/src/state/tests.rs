@@ -218,7 +218,7 @@ fn a_folder_of_another_format_is_refused_with_both_numbers() {
     assert!(
         error
             .to_string()
-            .ends_with("has format 7, and this program reads format 1"),
+            .ends_with("has format 7, and this program reads format 2"),
         "{error}"
     );
 }

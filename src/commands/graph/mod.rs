@@ -1,5 +1,6 @@
 //! `cortex graph`: the shared graph of a running instance, or of a file, for people and scripts.
 
+mod bytes;
 mod check;
 mod diff;
 mod export;
@@ -21,7 +22,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     let source = &arguments.source;
     match &arguments.action {
         GraphAction::Show { what } => read::show(source, what.as_deref()),
-        GraphAction::Get { path } => read::get(source, path),
+        GraphAction::Get { path, bytes: None } => read::get(source, path),
+        GraphAction::Get {
+            path,
+            bytes: Some(file),
+        } => bytes::save(source, path, file),
         GraphAction::Set { path, value } => write::set(source, path, value),
         GraphAction::Watch(watch) => watch::watch(source, watch),
         GraphAction::History { path, limit } => history::history(source, path, *limit),

@@ -89,6 +89,7 @@ pub(super) fn with_indices() -> Schema {
             index: true,
             history: 0,
             hot: None,
+            large: None,
         };
         schema.add_attribute(attribute).unwrap();
     }
