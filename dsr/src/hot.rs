@@ -2,7 +2,7 @@
 //! its own, over and over, and everybody reads them there. This file owns the page's layout and the
 //! protocol by which a value is read whole or not at all (a seqlock); it knows no process.
 //!
-//! Page, in words: 0 magic, 1 hash of the owner's name, 2 slots in use; from 16 on, slots of 16.
+//! Page, in words: 0 magic, 1 the owner's session, 2 slots in use; from 16 on, slots of 16.
 //! Slot: 0 sequence (odd while it is written), 1 to 3 whose (node, 0, attribute; or source, target,
 //! `attribute | label << 16 | 1 << 32`), 4 epoch, from 5 on the attribute as in a record's table. Words
 //! 1 to 3 are written once, before the slot is in use.
@@ -27,7 +27,7 @@ const CONTENT: usize = 11;
 const PATIENCE: u32 = 10_000;
 
 mod at {
-    pub(super) const OWNER: usize = 1;
+    pub(super) const SESSION: usize = 1;
     pub(super) const USED: usize = 2;
     pub(super) const KEY: usize = 1;
     pub(super) const CONTENT: usize = 4;
@@ -61,21 +61,25 @@ pub(crate) fn has_fixed_size(kind: ValueKind) -> bool {
     )
 }
 
+/// A page, and the session that it is of.
+#[derive(Debug, Clone)]
+pub(crate) struct Page {
+    pub(crate) session: u64,
+    pub(crate) segment: Arc<Segment>,
+}
+
 /// The pages that a snapshot reads besides its version.
 #[derive(Debug, Clone)]
 pub(crate) struct Hot {
-    pub(crate) pages: Arc<Vec<Arc<Segment>>>,
+    pub(crate) pages: Arc<Vec<Page>>,
     pub(crate) epoch: Epoch,
 }
 
 impl Hot {
-    /// The newest hot value of an attribute, where there is one.
-    pub(crate) fn read(&self, key: Key) -> Option<AttributeRecord> {
-        let found = self
-            .pages
-            .iter()
-            .filter_map(|page| read(page.words(), self.epoch, key));
-        found.max_by_key(|record| record.head.time)
+    /// The hot value of an attribute that a session gives out, where there is one.
+    pub(crate) fn read(&self, session: u64, key: Key) -> Option<AttributeRecord> {
+        let page = self.pages.iter().find(|page| page.session == session)?;
+        read(page.segment.words(), self.epoch, key)
     }
 }
 
@@ -84,18 +88,18 @@ fn slot(page: &[Word], index: usize) -> Option<&[Word; SLOT_WORDS]> {
     page.get(start..)?.first_chunk()
 }
 
-/// Makes a page of zeros one of that owner's; the writer's first act.
-pub(crate) fn format(page: &[Word], owner: u64) {
-    if let [magic, name, ..] = page {
-        name.store(owner);
+/// Makes a page of zeros one of that session's; the writer's first act.
+pub(crate) fn format(page: &[Word], session: u64) {
+    if let [magic, of, ..] = page {
+        of.store(session);
         magic.store_release(MAGIC);
     }
 }
 
-/// The hash of the owner's name, where this is a page.
-pub(crate) fn owner_of(page: &[Word]) -> Option<u64> {
+/// The session that a page is of, where this is one.
+pub(crate) fn session_of(page: &[Word]) -> Option<u64> {
     let whole = page.len() >= PAGE_WORDS && page.first()?.load_acquire() == MAGIC;
-    whole.then(|| page[at::OWNER].load())
+    whole.then(|| page[at::SESSION].load())
 }
 
 fn used(page: &[Word]) -> usize {
@@ -202,7 +206,7 @@ mod tests {
     #[test]
     fn a_value_is_read_as_it_was_written_last_under_this_store() {
         let page = page();
-        assert_eq!(owner_of(&page), Some(7));
+        assert_eq!(session_of(&page), Some(7));
         let index = claim(&page, key(5)).unwrap();
         assert_eq!(read(&page, EPOCH, key(5)), None, "not written yet");
         for (value, time) in [(Value::F64(1.5), 10), (Value::F64(2.5), 20)] {

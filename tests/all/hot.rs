@@ -1,7 +1,9 @@
 //! Attributes that their owner gives out beside the graph, between real processes.
 
 use crate::support::{Process, TestInstance};
-use dsr::{HotError, Owner, Session, Snapshot, Time, Transaction};
+use dsr::{
+    CommitError, HotAttribute, HotError, Owner, Refusal, Session, Snapshot, Time, Transaction,
+};
 use std::time::Duration;
 
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -54,7 +56,7 @@ fn a_hot_pose_is_read_whole_and_new_and_outlives_its_owner() {
         std::thread::yield_now();
     }
     // Who comes late finds it.
-    let mut late = Session::attach(&instance.0, "late", PATIENCE).unwrap();
+    let mut late = Session::attach(&instance.0, "tool", PATIENCE).unwrap();
     look_beyond(&mut late, last);
     // Its owner dies: what it said last stands, and the next owner goes on.
     owner.kill();
@@ -74,11 +76,62 @@ fn a_hot_pose_is_read_whole_and_new_and_outlives_its_owner() {
     store.finish();
 }
 
+/// The number of the robot's pose, given that of its owner.
+fn seen(session: &mut Session) -> i64 {
+    look(&session.snapshot().unwrap()).0
+}
+
+#[test]
+fn who_may_not_write_an_attribute_shows_nobody_a_value_of_it() {
+    let instance = TestInstance::new("foreign");
+    let store = Process::peer("hot-store", &instance);
+    let mut reader = Session::attach(&instance.0, "reader", PATIENCE).unwrap();
+    let robot = || Owner::Node("robot".into());
+    let refused = |session: &mut Session| {
+        let error = session.hot(robot(), "pose").unwrap_err();
+        let HotError::Commit(CommitError::Refused(Refusal::NotAllowed(why))) = error else {
+            panic!("{error}");
+        };
+        why
+    };
+    // An agent without the right, and a process that goes by the name of one that has it.
+    let mut guest = Session::attach(&instance.0, "guest", PATIENCE).unwrap();
+    assert!(refused(&mut guest).contains("`guest` has no manifest"));
+    let owner = Process::peer("hot-owner", &instance);
+    look_beyond(&mut reader, 0);
+    let mut impostor = Session::attach(&instance.0, "driver", PATIENCE).unwrap();
+    assert!(refused(&mut impostor).contains("only one process"));
+    owner.finish();
+    // Of two that may, readers believe the one that committed last, and not the later value.
+    let place = |n: i64| dsr::Pose::translation(n as f64, n as f64, n as f64);
+    let time = |n: i64| Time::from_nanoseconds(n * 1000);
+    let start = 1_000_000_000;
+    let mut tools: Vec<(Session, HotAttribute)> = (0..2)
+        .map(|i| {
+            let mut session = Session::attach(&instance.0, "tool", PATIENCE).unwrap();
+            let mut pose = session.hot(robot(), "pose").unwrap();
+            pose.set(place(start + i), time(start + i)).unwrap();
+            assert_eq!(seen(&mut reader), start + i);
+            (session, pose)
+        })
+        .collect();
+    let (session, pose) = &mut tools[0];
+    pose.set(place(start + 10), time(start + 10)).unwrap();
+    assert_eq!(seen(&mut reader), start + 1, "the other committed last");
+    let mut transaction = Transaction::new();
+    assert!(pose.fold_into(&mut transaction));
+    session.commit(&transaction, time(start + 10)).unwrap();
+    pose.set(place(start + 11), time(start + 11)).unwrap();
+    assert_eq!(seen(&mut reader), start + 11, "it has committed since");
+    drop((guest, impostor, reader, tools));
+    store.finish();
+}
+
 #[test]
 fn only_what_is_there_and_hot_can_be_given_out() {
     let instance = TestInstance::new("cold");
     let store = Process::peer("hot-store", &instance);
-    let mut session = Session::attach(&instance.0, "agent", PATIENCE).unwrap();
+    let mut session = Session::attach(&instance.0, "tool", PATIENCE).unwrap();
     let mut transaction = Transaction::new();
     transaction.create_node("robot", "other", vec![("speed".into(), 1.0.into())]);
     session.commit(&transaction, Time::default()).unwrap();

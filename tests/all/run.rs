@@ -233,7 +233,8 @@ fn the_live_graph_is_shown_from_another_terminal() {
             .contains("did you mean `robot`?")
     );
     // What the robot plans on is in the graph too, for whoever likes to look at it.
-    let file = run.folder().join("grid.f32");
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("grid.f32");
     let path = file.to_str().unwrap();
     let grid = ["graph", "get", "world.social_grid", "--bytes", path];
     let saved = Program::run(&[&grid[..], &["--instance", &name]].concat());

@@ -244,13 +244,18 @@ fn write_durable(instance: &Instance, client: u64) -> Outcome {
     }
 }
 
-/// A store in whose graph a robot's pose is hot.
+/// A store in whose graph a robot's pose is hot; `driver` may write that, `tool` everything.
 fn hot_store(instance: &Instance) -> Outcome {
     let text = "open = true\n[attributes]\npose = { kind = \"pose\", hot = 100.0 }\n";
     let mut store = Store::open(instance, Schema::from_toml("test", text)?)?;
     let mut transaction = Transaction::new();
     transaction.create_node("robot", "robot", vec![("pose".into(), place(0).into())]);
     store.commit(&transaction, Time::default())?;
+    let driver = "agent = \"driver\"\nattributes = [\"robot.pose\"]\n";
+    store.graph_mut().set_rights([
+        dsr::Manifest::from_toml("driver.toml", driver, &Schema::open())?,
+        dsr::Manifest::everything("tool"),
+    ]);
     println!("ready");
     let ended = end_of_input();
     while !ended.load(Ordering::Acquire) {

@@ -12,6 +12,7 @@ pub(crate) mod allocator;
 #[cfg(test)]
 pub(crate) mod journal;
 pub(crate) mod record;
+mod sessions;
 pub(crate) mod table;
 pub(crate) mod tree;
 pub(crate) mod trie;
@@ -85,6 +86,7 @@ mod at {
     pub(super) const LEASES: usize = 16;
     pub(super) const SLOTS: usize = 64;
     pub(super) const ROOTS: usize = SLOTS + super::SLOTS * super::SLOT_WORDS;
+    pub(super) const SESSIONS: usize = ROOTS + super::ROOT_RING as usize * super::ROOT_WORDS;
 }
 
 /// How many leases there may be at once.
@@ -94,7 +96,7 @@ const ROOT_RING: u64 = 4096;
 /// Words of a root.
 pub(crate) const ROOT_WORDS: usize = 18;
 /// First word that blocks are given out from.
-pub(crate) const FIRST_BLOCK: Address = at::ROOTS as u64 + ROOT_RING * ROOT_WORDS as u64;
+pub(crate) const FIRST_BLOCK: Address = (at::SESSIONS + sessions::COUNT) as u64;
 
 /// How a reader knows that its lease holds: its place has its token.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -7,7 +7,7 @@
 
 use super::apply::{Work, read};
 use crate::arena::{Address, Arena, tree};
-use crate::{Commit, NodeId, ReadError, Refusal, Snapshot, Time, Version};
+use crate::{Commit, Graph, NodeId, ReadError, Refusal, Snapshot, Time, Version};
 use serde::{Deserialize, Serialize};
 
 /// Clients whose last transactions are known; of more, those that asked last.
@@ -22,6 +22,18 @@ pub struct TransactionId {
     pub client: u64,
     /// The how-manyeth transaction of that client; the first is 1.
     pub sequence: u64,
+}
+
+impl Graph {
+    /// Notes by which session an agent commits: readers take hot values of what it committed last from
+    /// that session alone.
+    pub(crate) fn note_session(&self, agent: &str, session: u64) {
+        if self.schema.has_hot()
+            && let Some(writer) = self.writers.iter().position(|name| name == agent)
+        {
+            self.writer.arena.set_session(writer as u16, session);
+        }
+    }
 }
 
 /// A client's last transaction that was applied.

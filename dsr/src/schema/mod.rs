@@ -65,6 +65,7 @@ pub struct Schema {
     attribute_ids: FxHashMap<String, AttributeId>,
     /// For each type, itself and all its subtypes by id.
     subtypes: Vec<Vec<TypeId>>,
+    has_hot: bool,
 }
 
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -103,6 +104,7 @@ impl From<Parts> for Schema {
                 .map(|(i, a)| (a.name.clone(), AttributeId(i)))
                 .collect(),
             subtypes: Vec::new(),
+            has_hot: parts.attributes.iter().any(|found| found.hot.is_some()),
             parts,
         };
         schema.index_subtypes();
@@ -163,10 +165,7 @@ impl Schema {
 
     /// Whether any attribute is hot.
     pub fn has_hot(&self) -> bool {
-        self.parts
-            .attributes
-            .iter()
-            .any(|found| found.hot.is_some())
+        self.has_hot
     }
 
     /// How many times a second the attribute's owner folds it into the graph, where it is hot.
@@ -318,6 +317,7 @@ impl Schema {
         }
         let id = AttributeId(next_id(&attribute.name, self.parts.attributes.len())?);
         self.attribute_ids.insert(attribute.name.clone(), id);
+        self.has_hot |= attribute.hot.is_some();
         self.parts.attributes.push(attribute);
         Ok(id)
     }

@@ -4,10 +4,9 @@
 
 use super::arena::Current;
 use super::page::{OwnPage, Pages};
-use super::{InstanceError, IpcNode, Segment};
-use crate::arena::Word;
-use crate::hot::{self, PAGE_WORDS};
-use crate::value::hash;
+use super::{InstanceError, IpcNode, MAX_PROCESSES};
+use crate::arena::{Arena, Word};
+use crate::hot::{self, PAGE_WORDS, Page};
 use crate::{AttributeId, Epoch, Owner, SchemaError, Time, Transaction, Value};
 use std::sync::Arc;
 use thiserror::Error;
@@ -35,6 +34,9 @@ pub enum HotError {
     /// The session has as many hot attributes as there can be.
     #[error("a session can have {} hot attributes", hot::SLOTS)]
     Full,
+    /// The store does not let this agent write the attribute, or did not answer.
+    #[error(transparent)]
+    Commit(#[from] super::CommitError),
     /// The instance or its graph cannot be used.
     #[error(transparent)]
     Attach(#[from] super::AttachError),
@@ -48,9 +50,9 @@ impl From<InstanceError> for HotError {
 
 const HOT: &str = "graph/hot";
 
-/// A page for the hot attributes of that agent.
-pub(super) fn page(node: &IpcNode, agent: &str) -> Result<OwnPage, InstanceError> {
-    let format = |words: &[Word]| hot::format(words, hash(agent));
+/// A page for the hot attributes of that session.
+pub(super) fn page(node: &IpcNode, session: u64) -> Result<OwnPage, InstanceError> {
+    let format = |words: &[Word]| hot::format(words, session);
     OwnPage::open(node, HOT, PAGE_WORDS, format)
 }
 
@@ -121,7 +123,7 @@ impl HotAttribute {
 #[derive(Debug)]
 pub(super) struct HotSubscriber {
     arriving: Pages,
-    pages: Arc<Vec<Arc<Segment>>>,
+    pages: Arc<Vec<Page>>,
 }
 
 impl HotSubscriber {
@@ -133,23 +135,25 @@ impl HotSubscriber {
     }
 
     /// The pages that have come at the last [`Self::poll`]; `None` where there are none.
-    pub(super) fn pages(&self) -> Option<Arc<Vec<Arc<Segment>>>> {
+    pub(super) fn pages(&self) -> Option<Arc<Vec<Page>>> {
         (!self.pages.is_empty()).then(|| Arc::clone(&self.pages))
     }
 
-    /// Takes what has come.
-    pub(super) fn poll(&mut self) -> Result<(), InstanceError> {
-        while let Some(page) = self.arriving.receive()? {
-            let Some(owner) = hot::owner_of(page.words()) else {
+    /// Takes what has come; the arena says which of it matters.
+    pub(super) fn poll(&mut self, arena: Option<&Arena>) -> Result<(), InstanceError> {
+        while let Some(segment) = self.arriving.receive()? {
+            let Some(session) = hot::session_of(segment.words()) else {
                 continue;
             };
-            // An owner that came again has a new page.
-            let others = self.pages.iter();
-            let mut pages: Vec<Arc<Segment>> = others
-                .filter(|page| hot::owner_of(page.words()) != Some(owner))
-                .cloned()
-                .collect();
-            pages.push(Arc::new(page));
+            let segment = Arc::new(segment);
+            let mut pages = Vec::clone(&self.pages);
+            pages.push(Page { session, segment });
+            if pages.len() > MAX_PROCESSES {
+                // Of sessions that have ended; but what a dead owner gave out last stands.
+                let stands = |page: &Page| arena.is_some_and(|a| a.has_session(page.session));
+                let needless = pages.iter().position(|page| !stands(page));
+                pages.remove(needless.unwrap_or(0));
+            }
             self.pages = Arc::new(pages);
         }
         Ok(())

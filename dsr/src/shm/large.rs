@@ -33,7 +33,7 @@ use thiserror::Error;
 
 /// How many of a stream's newest values wait for a reader that is slow or comes late.
 pub(super) const KEPT: usize = 3;
-/// How many values of one stream a session can hold at once.
+/// How many values of one stream a session can hold at once, at least.
 pub(super) const HELD: usize = 8;
 /// A value begins where a cache line does.
 const LINE: Alignment = Alignment::ALIGN_64;

@@ -6,6 +6,7 @@
 mod clock;
 mod commit;
 mod desk;
+mod hot;
 mod large;
 mod look;
 
@@ -19,7 +20,7 @@ use desk::Desk;
 
 use super::arena::ArenaSubscriber;
 use super::changes::Changes;
-use super::hot::{self, HotAttribute, HotError, HotSubscriber};
+use super::hot::HotSubscriber;
 use super::large::{OwnStreams, Readers};
 use super::lease::Tenant;
 use super::page::OwnPage;
@@ -28,10 +29,7 @@ use super::{
     one_at_a_time, pause, service_name,
 };
 use crate::arena::{Arena, Root, record};
-use crate::hot::{Hot, Key, claim};
-use crate::{
-    AttributeId, EdgeKey, Epoch, Filter, NodeId, NodeRef, Owner, ReadError, Schema, Snapshot,
-};
+use crate::{Epoch, Filter, ReadError, Schema, Snapshot};
 use iceoryx2::port::client::Client;
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
@@ -228,7 +226,7 @@ impl Session {
         if looked.is_none_or(|looked| time.saturating_duration_since(looked) >= NEWS) {
             self.arena.poll()?;
             if let Some(hot) = &mut self.hot {
-                hot.poll()?;
+                hot.poll(self.arena.newest().map(|(_, arena)| arena).as_deref())?;
             }
             self.looked = Some(time);
         }
@@ -297,58 +295,9 @@ impl Session {
                     schema
                 }
             };
-            let hot = self.hot_of(epoch, &schema)?;
+            let hot = self.hot_of((epoch, &arena), &schema)?;
             return Ok(Snapshot::new(Arc::clone(&arena), root, schema).with_hot(hot));
         }
-    }
-
-    /// What owners give out beside a graph with that schema.
-    fn hot_of(&mut self, epoch: Epoch, schema: &Schema) -> Result<Option<Hot>, InstanceError> {
-        if self.hot.is_none() && schema.has_hot() {
-            self.hot.insert(HotSubscriber::open(&self.node)?).poll()?;
-        }
-        let pages = self.hot.as_ref().and_then(HotSubscriber::pages);
-        Ok(pages.map(|pages| Hot { pages, epoch }))
-    }
-
-    /// Makes this process the one that gives out an attribute beside the graph, so that it can be
-    /// written a thousand times a second. The schema says that it is `hot`; the graph has a first
-    /// value of it. Only one process may do so at a time; who reads takes the newest.
-    ///
-    /// # Errors
-    /// [`HotError`].
-    pub fn hot(&mut self, owner: Owner, name: &str) -> Result<HotAttribute, HotError> {
-        let snapshot = self.snapshot()?;
-        let schema = Arc::clone(&snapshot.schema);
-        let attribute = schema.attribute_id(name)?;
-        let Some(rate) = schema.hot_rate(attribute) else {
-            let attribute = name.to_owned();
-            return Err(HotError::NotHot { attribute });
-        };
-        let key = hot_key(&snapshot, &owner, attribute).map_err(AttachError::from)?;
-        let Some(key) = key else {
-            let attribute = name.to_owned();
-            return Err(HotError::NotFound { attribute, owner });
-        };
-        let page = match &self.page {
-            Some(page) => Arc::clone(page),
-            None => Arc::new(hot::page(&self.node, &self.agent)?),
-        };
-        self.page = Some(Arc::clone(&page));
-        let slot = claim(page.words(), key).ok_or(HotError::Full)?;
-        Ok(HotAttribute {
-            page,
-            slot,
-            owner,
-            name: name.to_owned(),
-            schema,
-            attribute,
-            current: self.arena.current.clone(),
-            interval: rate.recip(),
-            folded: None,
-            last: None,
-            scratch: Vec::new(),
-        })
     }
 
     /// The first life of the store of that epoch.
@@ -405,39 +354,6 @@ impl Session {
 fn ring(store: &Notifier<Ipc>) {
     if let Err(error) = store.notify() {
         tracing::debug!("waking the store: {error}");
-    }
-}
-
-/// The key of an attribute in a page, where the graph has the attribute.
-fn hot_key(
-    snapshot: &Snapshot,
-    owner: &Owner,
-    attribute: AttributeId,
-) -> Result<Option<Key>, ReadError> {
-    let find = |node: &NodeRef| match node {
-        NodeRef::Id(id) => snapshot.find_node(*id),
-        NodeRef::Name(name) => snapshot.find_node_by_name(name),
-    };
-    let id = |node| Ok(find(node)?.map(|node| node.id()));
-    match owner {
-        Owner::Node(node) => {
-            let Some(node) = find(node)? else {
-                return Ok(None);
-            };
-            let there = node.attribute(attribute)?;
-            Ok(there.map(|_| Key::of_node(node.id(), attribute)))
-        }
-        Owner::Edge(edge) => {
-            let label = snapshot.schema().find_label(&edge.label);
-            let ends: (Option<NodeId>, Option<NodeId>) = (id(&edge.from)?, id(&edge.to)?);
-            let (Some(label), (Some(from), Some(to))) = (label, ends) else {
-                return Ok(None);
-            };
-            let key = EdgeKey { from, label, to };
-            let edge = snapshot.find_edge(key)?;
-            let there = edge.map(|edge| edge.attribute(attribute)).transpose()?;
-            Ok(there.flatten().map(|_| Key::of_edge(key, attribute)))
-        }
     }
 }
 

@@ -179,9 +179,10 @@ impl<'a> Element<'a> {
 
     /// What its owner gives out of a hot attribute takes the place of what was committed before.
     fn newest(&self, name: AttributeId, committed: AttributeRecord) -> Attribute {
-        let hot = self.snapshot.hot.as_ref().filter(|_| self.is_hot(name));
-        let found = hot.and_then(|hot| hot.read(self.key_of(name)?));
         let head = committed.head;
+        let hot = self.snapshot.hot.as_ref().filter(|_| self.is_hot(name));
+        let session = || self.snapshot.arena.session_of(head.writer);
+        let found = hot.and_then(|hot| hot.read(session(), self.key_of(name)?));
         match found {
             Some(hot) if hot.head.time > head.time => {
                 let time = hot.head.time;

@@ -41,7 +41,9 @@ pub enum LargeReadError {
     #[error("the handle is wrong: the value of that number is another")]
     Mismatch,
     /// The session holds as many values of this stream as it may.
-    #[error("{HELD} values of this stream are held already; drop one")]
+    #[error(
+        "the session holds all the values of this stream that it may, at least {HELD}; drop one"
+    )]
     TooManyHeld,
     /// The instance cannot be used.
     #[error(transparent)]

@@ -46,6 +46,9 @@ impl Store {
             Some(answer) => vec![answer],
             None => self.decide_all(request),
         };
+        if answers.iter().any(Result::is_ok) {
+            self.graph.note_session(&request.agent, client);
+        }
         // Before the answer: who goes on when it has it finds the changes there.
         self.tell();
         if self.answered.len() >= CLIENTS && !self.answered.contains_key(&client) {
