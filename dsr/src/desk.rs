@@ -11,9 +11,9 @@
 //! request, 2 its length in bytes, from 3 on the bytes. Bytes lie eight to a word, lowest first.
 
 use crate::Epoch;
-use crate::arena::Word;
+use crate::arena::protocol::Atomic;
 use crate::arena::record::pack;
-use std::sync::atomic::{Ordering, fence};
+use std::sync::atomic::Ordering::{Acquire, Relaxed, Release, SeqCst};
 
 const MAGIC: u64 = u64::from_le_bytes(*b"cortexD1");
 /// Words of a desk.
@@ -49,38 +49,6 @@ mod slot {
     pub(super) const BYTES: usize = 3;
 }
 
-/// A word that several processes use: the real one, or a model checker's.
-pub(crate) trait Atom {
-    fn load(&self) -> u64;
-    fn store(&self, value: u64);
-    fn load_acquire(&self) -> u64;
-    fn store_release(&self, value: u64);
-    fn fence(order: Ordering);
-}
-
-impl Atom for Word {
-    #[inline]
-    fn load(&self) -> u64 {
-        self.load()
-    }
-    #[inline]
-    fn store(&self, value: u64) {
-        self.store(value);
-    }
-    #[inline]
-    fn load_acquire(&self) -> u64 {
-        self.load_acquire()
-    }
-    #[inline]
-    fn store_release(&self, value: u64) {
-        self.store_release(value);
-    }
-    #[inline]
-    fn fence(order: Ordering) {
-        fence(order);
-    }
-}
-
 /// Whose a desk is.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Owner {
@@ -99,23 +67,23 @@ pub(crate) enum Answered {
 }
 
 /// Whether the bytes had room.
-fn put<A: Atom>(words: &[A], bytes: &[u8]) -> bool {
+fn put<A: Atomic>(words: &[A], bytes: &[u8]) -> bool {
     let fits = bytes.len() <= words.len() * 8;
     if fits {
         for (word, eight) in words.iter().zip(pack(bytes)) {
-            word.store(eight);
+            word.store(eight, Relaxed);
         }
     }
     fits
 }
 
 /// Copies so many bytes into the buffer, where there are so many.
-fn get<A: Atom>(words: &[A], length: u64, bytes: &mut Vec<u8>) -> bool {
+fn get<A: Atomic>(words: &[A], length: u64, bytes: &mut Vec<u8>) -> bool {
     bytes.clear();
     let fits = length <= words.len() as u64 * 8;
     if fits {
         for word in &words[..(length as usize).div_ceil(8)] {
-            bytes.extend_from_slice(&word.load().to_le_bytes());
+            bytes.extend_from_slice(&word.load(Relaxed).to_le_bytes());
         }
         bytes.truncate(length as usize);
     }
@@ -124,94 +92,96 @@ fn get<A: Atom>(words: &[A], length: u64, bytes: &mut Vec<u8>) -> bool {
 
 /// Makes a page of zeros the desk of that owner; false where its name is too long. The owner's first
 /// act.
-pub(crate) fn format<A: Atom>(desk: &[A], owner: &Owner) -> bool {
+pub(crate) fn format<A: Atomic>(desk: &[A], owner: &Owner) -> bool {
     let fits = desk.len() >= DESK_WORDS && put(&desk[at::NAME..REQUEST], owner.agent.as_bytes());
     if fits {
-        desk[at::CLIENT].store(owner.client);
-        desk[at::PROCESS].store(u64::from(owner.process));
-        desk[at::NAME_LENGTH].store(owner.agent.len() as u64);
-        desk[0].store_release(MAGIC);
+        desk[at::CLIENT].store(owner.client, Relaxed);
+        desk[at::PROCESS].store(u64::from(owner.process), Relaxed);
+        desk[at::NAME_LENGTH].store(owner.agent.len() as u64, Relaxed);
+        desk[0].store(MAGIC, Release);
     }
     fits
 }
 
 /// Whose desk it is, where it is one and open.
-pub(crate) fn owner_of<A: Atom>(desk: &[A]) -> Option<Owner> {
+pub(crate) fn owner_of<A: Atomic>(desk: &[A]) -> Option<Owner> {
     if desk.len() < DESK_WORDS || !is_open(desk) {
         return None;
     }
     let mut name = Vec::new();
-    let length = desk[at::NAME_LENGTH].load();
+    let length = desk[at::NAME_LENGTH].load(Relaxed);
     get(&desk[at::NAME..REQUEST], length, &mut name).then_some(())?;
     Some(Owner {
-        client: desk[at::CLIENT].load(),
-        process: u32::try_from(desk[at::PROCESS].load()).ok()?,
+        client: desk[at::CLIENT].load(Relaxed),
+        process: u32::try_from(desk[at::PROCESS].load(Relaxed)).ok()?,
         agent: String::from_utf8(name).ok()?,
     })
 }
 
 /// Says that nothing more will come from the desk. Its owner's last act.
-pub(crate) fn close<A: Atom>(desk: &[A]) {
+pub(crate) fn close<A: Atomic>(desk: &[A]) {
     if let Some(magic) = desk.first() {
-        magic.store_release(0);
+        magic.store(0, Release);
     }
 }
 
 /// Whether something may still come from the desk.
-pub(crate) fn is_open<A: Atom>(desk: &[A]) -> bool {
+pub(crate) fn is_open<A: Atomic>(desk: &[A]) -> bool {
     desk.first()
-        .is_some_and(|magic| magic.load_acquire() == MAGIC)
+        .is_some_and(|magic| magic.load(Acquire) == MAGIC)
 }
 
 /// The part of a desk that holds the request.
-pub(crate) fn request_of<A: Atom>(desk: &[A]) -> &[A] {
+pub(crate) fn request_of<A: Atomic>(desk: &[A]) -> &[A] {
     desk.get(REQUEST..).unwrap_or(&[])
 }
 
 /// Lays a request down, for the store of that epoch; false where it is too long. For the owner alone.
-pub(crate) fn lay<A: Atom>(request: &[A], sequence: u64, epoch: Epoch, bytes: &[u8]) -> bool {
+pub(crate) fn lay<A: Atomic>(request: &[A], sequence: u64, epoch: Epoch, bytes: &[u8]) -> bool {
     if request.len() < request::BYTES || bytes.len() > (request.len() - request::BYTES) * 8 {
         return false;
     }
     // Who sees any of what follows sees that the state is odd.
-    request[request::STATE].store(sequence << 1 | 1);
-    A::fence(Ordering::Release);
-    request[request::EPOCH].store(epoch.0);
-    request[request::LENGTH].store(bytes.len() as u64);
+    request[request::STATE].store(sequence << 1 | 1, Relaxed);
+    A::fence(Release);
+    request[request::EPOCH].store(epoch.0, Relaxed);
+    request[request::LENGTH].store(bytes.len() as u64, Relaxed);
     put(&request[request::BYTES..], bytes);
-    request[request::STATE].store_release(sequence << 1);
+    request[request::STATE].store(sequence << 1, Release);
     // Before its owner looks whether the store sleeps.
-    A::fence(Ordering::SeqCst);
+    A::fence(SeqCst);
     true
 }
 
 /// Says whether the owner sleeps, before it looks for the answer one last time. For the owner alone.
-pub(crate) fn set_asleep<A: Atom>(request: &[A], asleep: bool) {
+pub(crate) fn set_asleep<A: Atomic>(request: &[A], asleep: bool) {
     if let Some(word) = request.get(request::ASLEEP) {
-        word.store(u64::from(asleep));
+        word.store(u64::from(asleep), Relaxed);
     }
-    A::fence(Ordering::SeqCst);
+    A::fence(SeqCst);
 }
 
 /// Whether the owner has to be woken for an answer that was given before this call: either this sees
 /// that it sleeps, or its last look sees the answer.
-pub(crate) fn is_asleep<A: Atom>(request: &[A]) -> bool {
-    A::fence(Ordering::SeqCst);
+pub(crate) fn is_asleep<A: Atomic>(request: &[A]) -> bool {
+    A::fence(SeqCst);
     request
         .get(request::ASLEEP)
-        .is_some_and(|word| word.load() != 0)
+        .is_some_and(|word| word.load(Relaxed) != 0)
 }
 
 /// What tells a request from those before it.
 #[inline]
-pub(crate) fn state<A: Atom>(request: &[A]) -> u64 {
-    request.get(request::STATE).map_or(0, Atom::load_acquire)
+pub(crate) fn state<A: Atomic>(request: &[A]) -> u64 {
+    request
+        .get(request::STATE)
+        .map_or(0, |word| word.load(Acquire))
 }
 
 /// Takes the request that `state` told of: its sequence, and its bytes into the buffer. `None` where
 /// it is not whole, or is not for the store of that epoch. A request is there to be taken as often as
 /// one likes.
-pub(crate) fn take<A: Atom>(
+pub(crate) fn take<A: Atomic>(
     request: &[A],
     state: u64,
     epoch: Epoch,
@@ -220,52 +190,52 @@ pub(crate) fn take<A: Atom>(
     if state == 0 || state & 1 == 1 || request.len() < request::BYTES {
         return None;
     }
-    let of = request[request::EPOCH].load();
-    let length = request[request::LENGTH].load();
+    let of = request[request::EPOCH].load(Relaxed);
+    let length = request[request::LENGTH].load(Relaxed);
     let fits = get(&request[request::BYTES..], length, bytes);
-    A::fence(Ordering::Acquire);
-    let whole = request[request::STATE].load() == state;
+    A::fence(Acquire);
+    let whole = request[request::STATE].load(Relaxed) == state;
     (whole && fits && of == epoch.0).then_some(state >> 1)
 }
 
 /// Gives a slot to a client. For the store alone.
-pub(crate) fn assign<A: Atom>(slot: &[A], client: u64) {
+pub(crate) fn assign<A: Atomic>(slot: &[A], client: u64) {
     if slot.len() >= SLOT_WORDS {
-        slot[slot::CLIENT].store(0);
-        slot[slot::STATE].store(0);
-        slot[slot::CLIENT].store_release(client);
+        slot[slot::CLIENT].store(0, Relaxed);
+        slot[slot::STATE].store(0, Relaxed);
+        slot[slot::CLIENT].store(client, Release);
     }
 }
 
 /// Whether the slot is that client's.
-pub(crate) fn is_of<A: Atom>(slot: &[A], client: u64) -> bool {
+pub(crate) fn is_of<A: Atomic>(slot: &[A], client: u64) -> bool {
     slot.get(slot::CLIENT)
-        .is_some_and(|word| word.load_acquire() == client)
+        .is_some_and(|word| word.load(Acquire) == client)
 }
 
 /// Answers a request, with those bytes where they have room. For the store alone.
-pub(crate) fn answer<A: Atom>(slot: &[A], sequence: u64, bytes: Option<&[u8]>) {
+pub(crate) fn answer<A: Atomic>(slot: &[A], sequence: u64, bytes: Option<&[u8]>) {
     if slot.len() <= slot::BYTES {
         return;
     }
     let here = bytes.is_some_and(|bytes| put(&slot[slot::BYTES..], bytes));
     let length = bytes.map_or(0, |bytes| bytes.len() as u64);
-    slot[slot::LENGTH].store(length);
-    slot[slot::STATE].store_release(sequence << 1 | u64::from(!here));
+    slot[slot::LENGTH].store(length, Relaxed);
+    slot[slot::STATE].store(sequence << 1 | u64::from(!here), Release);
 }
 
 /// The answer to a request, its bytes into the buffer.
 #[inline]
-pub(crate) fn answered<A: Atom>(
+pub(crate) fn answered<A: Atomic>(
     slot: &[A],
     sequence: u64,
     bytes: &mut Vec<u8>,
 ) -> Option<Answered> {
-    let state = slot.get(slot::STATE)?.load_acquire();
+    let state = slot.get(slot::STATE)?.load(Acquire);
     if state >> 1 != sequence {
         return None;
     }
-    let length = slot.get(slot::LENGTH)?.load();
+    let length = slot.get(slot::LENGTH)?.load(Relaxed);
     let here = state & 1 == 0 && get(slot.get(slot::BYTES..)?, length, bytes);
     Some(if here {
         Answered::Here

@@ -7,12 +7,12 @@
 //! `attribute | label << 16 | 1 << 32`), 4 epoch, from 5 on the attribute as in a record's table. Words
 //! 1 to 3 are written once, before the slot is in use.
 
-use crate::arena::Word;
+use crate::arena::protocol::Atomic;
 use crate::arena::table::AttributeRecord;
 use crate::shm::Segment;
 use crate::{AttributeId, EdgeKey, Epoch, NodeId, Value, ValueKind};
 use std::sync::Arc;
-use std::sync::atomic::{Ordering, fence};
+use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
 
 /// Hot attributes that one owner can have.
 pub(crate) const SLOTS: usize = 64;
@@ -83,42 +83,44 @@ impl Hot {
     }
 }
 
-fn slot(page: &[Word], index: usize) -> Option<&[Word; SLOT_WORDS]> {
+fn slot<W>(page: &[W], index: usize) -> Option<&[W; SLOT_WORDS]> {
     let start = FIRST_SLOT + index.min(SLOTS) * SLOT_WORDS;
     page.get(start..)?.first_chunk()
 }
 
 /// Makes a page of zeros one of that session's; the writer's first act.
-pub(crate) fn format(page: &[Word], session: u64) {
+pub(crate) fn format<W: Atomic>(page: &[W], session: u64) {
     if let [magic, of, ..] = page {
-        of.store(session);
-        magic.store_release(MAGIC);
+        of.store(session, Relaxed);
+        magic.store(MAGIC, Release);
     }
 }
 
 /// The session that a page is of, where this is one.
-pub(crate) fn session_of(page: &[Word]) -> Option<u64> {
-    let whole = page.len() >= PAGE_WORDS && page.first()?.load_acquire() == MAGIC;
-    whole.then(|| page[at::SESSION].load())
+pub(crate) fn session_of<W: Atomic>(page: &[W]) -> Option<u64> {
+    let whole = page.len() >= PAGE_WORDS && page.first()?.load(Acquire) == MAGIC;
+    whole.then(|| page[at::SESSION].load(Relaxed))
 }
 
-fn used(page: &[Word]) -> usize {
-    let used = page.get(at::USED).map_or(0, Word::load_acquire);
+fn used<W: Atomic>(page: &[W]) -> usize {
+    let used = page.get(at::USED).map_or(0, |word| word.load(Acquire));
     (used as usize).min(SLOTS)
 }
 
-fn find(page: &[Word], key: Key) -> Option<usize> {
+fn find<W: Atomic>(page: &[W], key: Key) -> Option<usize> {
     (0..used(page)).find(|&index| {
         slot(page, index).is_some_and(|slot| {
             let found = slot[at::KEY..].iter().zip(key.0);
-            found.take(3).all(|(word, wanted)| word.load() == wanted)
+            found
+                .take(3)
+                .all(|(word, wanted)| word.load(Relaxed) == wanted)
         })
     })
 }
 
 /// The slot of an attribute, a new one if it has none; `None` where the page is full. For the
 /// page's owner alone.
-pub(crate) fn claim(page: &[Word], key: Key) -> Option<usize> {
+pub(crate) fn claim<W: Atomic>(page: &[W], key: Key) -> Option<usize> {
     if let Some(index) = find(page, key) {
         return Some(index);
     }
@@ -128,17 +130,17 @@ pub(crate) fn claim(page: &[Word], key: Key) -> Option<usize> {
         return None;
     }
     for (word, value) in slot[at::KEY..].iter().zip(key.0) {
-        word.store(value);
+        word.store(value, Relaxed);
     }
-    count.store_release(index as u64 + 1);
+    count.store(index as u64 + 1, Release);
     Some(index)
 }
 
 /// Writes a value that the owner gives out. For the page's owner alone.
 ///
 /// `scratch` saves an allocation.
-pub(crate) fn write(
-    page: &[Word],
+pub(crate) fn write<W: Atomic>(
+    page: &[W],
     index: usize,
     epoch: Epoch,
     (value, time): (&Value, i64),
@@ -150,164 +152,41 @@ pub(crate) fn write(
     scratch.clear();
     scratch.push(epoch.0);
     AttributeRecord::encode(scratch, value, (0, time, 0), None);
-    let sequence = slot[0].load();
+    let sequence = slot[0].load(Relaxed);
     // Who sees any of what follows sees that the sequence is odd.
-    slot[0].store(sequence | 1);
-    fence(Ordering::Release);
+    slot[0].store(sequence | 1, Relaxed);
+    W::fence(Release);
     for (to, from) in slot[at::CONTENT..].iter().zip(scratch.iter()) {
-        to.store(*from);
+        to.store(*from, Relaxed);
     }
     // An owner that died in the middle and came again left an odd one.
-    slot[0].store_release((sequence | 1).wrapping_add(1));
+    slot[0].store((sequence | 1).wrapping_add(1), Release);
 }
 
 /// The value of an attribute, if the page has it. Never one that was not written so: an owner that is
 /// writing is waited for, for a moment.
-pub(crate) fn read(page: &[Word], epoch: Epoch, key: Key) -> Option<AttributeRecord> {
+pub(crate) fn read<W: Atomic>(page: &[W], epoch: Epoch, key: Key) -> Option<AttributeRecord> {
     let slot = slot(page, find(page, key)?)?;
     for _ in 0..PATIENCE {
-        let before = slot[0].load_acquire();
+        let before = slot[0].load(Acquire);
         let mut words = [0; CONTENT];
         for (to, from) in words.iter_mut().zip(&slot[at::CONTENT..]) {
-            *to = from.load();
+            *to = from.load(Relaxed);
         }
-        fence(Ordering::Acquire);
-        if before & 1 == 0 && slot[0].load() == before {
+        W::fence(Acquire);
+        if before & 1 == 0 && slot[0].load(Relaxed) == before {
             // Nothing was written yet, or under another store, whose nodes were others.
             if before == 0 || words[0] != epoch.0 {
                 return None;
             }
             return AttributeRecord::decode(&words[1..]);
         }
-        std::hint::spin_loop();
+        W::pause();
     }
     None
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{LabelId, Pose};
-    use nalgebra::{Translation3, UnitQuaternion};
-    use std::sync::atomic::AtomicBool;
-
-    const EPOCH: Epoch = Epoch(3);
-
-    fn page() -> Arc<[Word]> {
-        let page: Arc<[Word]> = (0..PAGE_WORDS).map(|_| Word::default()).collect();
-        format(&page, 7);
-        page
-    }
-
-    fn key(node: u64) -> Key {
-        Key::of_node(NodeId(node), AttributeId(1))
-    }
-
-    #[test]
-    fn a_value_is_read_as_it_was_written_last_under_this_store() {
-        let page = page();
-        assert_eq!(session_of(&page), Some(7));
-        let index = claim(&page, key(5)).unwrap();
-        assert_eq!(read(&page, EPOCH, key(5)), None, "not written yet");
-        for (value, time) in [(Value::F64(1.5), 10), (Value::F64(2.5), 20)] {
-            write(&page, index, EPOCH, (&value, time), &mut Vec::new());
-            let read = read(&page, EPOCH, key(5)).unwrap();
-            assert_eq!((read.value, read.head.time), (value, time));
-        }
-        assert_eq!(read(&page, EPOCH, key(6)), None);
-        assert_eq!(read(&page, Epoch(4), key(5)), None, "another store's graph");
-    }
-
-    #[test]
-    fn every_attribute_has_a_slot_of_its_own_until_the_page_is_full() {
-        let page = page();
-        let edge = EdgeKey {
-            from: NodeId(0),
-            label: LabelId(0),
-            to: NodeId(0),
-        };
-        let first = claim(&page, Key::of_edge(edge, AttributeId(1))).unwrap();
-        let mut slots = vec![first];
-        slots.extend((0..SLOTS as u64 - 1).map(|node| claim(&page, key(node)).unwrap()));
-        let distinct: std::collections::BTreeSet<_> = slots.iter().collect();
-        assert_eq!(distinct.len(), SLOTS);
-        assert_eq!(claim(&page, key(0)), Some(slots[1]), "claimed again");
-        assert_eq!(claim(&page, key(1000)), None);
-    }
-
-    #[test]
-    fn an_owner_that_died_while_it_wrote_leaves_no_value_and_its_next_life_gives_one() {
-        let page = page();
-        let index = claim(&page, key(1)).unwrap();
-        write(&page, index, EPOCH, (&Value::U64(1), 1), &mut Vec::new());
-        let words = slot(&page, index).unwrap();
-        words[0].store(words[0].load() | 1);
-        assert_eq!(read(&page, EPOCH, key(1)), None);
-        write(&page, index, EPOCH, (&Value::U64(2), 2), &mut Vec::new());
-        let read = read(&page, EPOCH, key(1)).unwrap();
-        assert_eq!(read.value, Value::U64(2));
-    }
-
-    struct EndOnDrop<'a>(&'a AtomicBool);
-
-    impl Drop for EndOnDrop<'_> {
-        fn drop(&mut self) {
-            self.0.store(true, Ordering::Relaxed);
-        }
-    }
-
-    #[test]
-    fn no_value_is_read_in_halves_while_it_is_written() {
-        let page = page();
-        let index = claim(&page, key(1)).unwrap();
-        let pose = |n: f64| {
-            let rotation = UnitQuaternion::identity();
-            Value::Pose(Pose::from_parts(Translation3::new(n, n, n), rotation))
-        };
-        write(&page, index, EPOCH, (&pose(0.0), 0), &mut Vec::new());
-        let ended = AtomicBool::new(false);
-        std::thread::scope(|scope| {
-            scope.spawn(|| {
-                let mut scratch = Vec::new();
-                for n in 1.. {
-                    write(&page, index, EPOCH, (&pose(n as f64), n), &mut scratch);
-                    if ended.load(Ordering::Relaxed) {
-                        break;
-                    }
-                }
-            });
-            // Also where an assertion fails, or the writer would never end.
-            let _end = EndOnDrop(&ended);
-            let (mut last, mut reads) = (-1, 0);
-            while reads < 200_000 || last < 1_000 {
-                reads += 1;
-                let read = read(&page, EPOCH, key(1));
-                // The writer was stopped in the middle by the scheduler, or has not begun.
-                let Some(read) = read.filter(|read| read.head.time > 0) else {
-                    std::thread::yield_now();
-                    continue;
-                };
-                let place = read.value.as_pose().unwrap().translation.vector;
-                let numbers = [place.x, place.y, place.z].map(|number| number as i64);
-                assert_eq!(numbers, [read.head.time; 3]);
-                assert!(read.head.time >= last, "time ran back");
-                last = read.head.time;
-            }
-        });
-    }
-
-    #[test]
-    fn no_words_make_a_reader_fail() {
-        let page = page();
-        for (index, word) in page.iter().enumerate().skip(1) {
-            word.store((index as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15));
-        }
-        assert_eq!(read(&page, EPOCH, key(1)), None);
-        for (index, word) in [key(1).0[0], 0, key(1).0[2], EPOCH.0].iter().enumerate() {
-            page[FIRST_SLOT + 1 + index].store(*word);
-        }
-        page[FIRST_SLOT].store(2);
-        drop(read(&page, EPOCH, key(1)));
-        assert_eq!(read(&[], EPOCH, key(1)), None);
-    }
-}
+mod model;
+#[cfg(test)]
+mod tests;

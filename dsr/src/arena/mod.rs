@@ -11,6 +11,7 @@
 pub(crate) mod allocator;
 #[cfg(test)]
 pub(crate) mod journal;
+pub(crate) mod protocol;
 pub(crate) mod record;
 mod sessions;
 pub(crate) mod table;
@@ -20,7 +21,8 @@ pub(crate) mod trie;
 use crate::desk::{SLOT_WORDS, SLOTS};
 use crate::shm::{Segment, Segments};
 use crate::{Epoch, Time, Version};
-use std::sync::atomic::{AtomicU64, Ordering, fence};
+use protocol::Ring;
+use std::sync::atomic::{AtomicU64, Ordering};
 use thiserror::Error;
 
 /// A word of the arena.
@@ -33,18 +35,20 @@ impl Word {
     pub(crate) fn load(&self) -> u64 {
         self.0.load(Ordering::Relaxed)
     }
-    pub(crate) fn store(&self, value: u64) {
+    #[inline]
+    fn put(&self, value: u64, order: Ordering) {
         #[cfg(test)]
         journal::note(self, value);
-        self.0.store(value, Ordering::Relaxed);
+        self.0.store(value, order);
+    }
+    pub(crate) fn store(&self, value: u64) {
+        self.put(value, Ordering::Relaxed);
     }
     pub(crate) fn load_acquire(&self) -> u64 {
         self.0.load(Ordering::Acquire)
     }
     pub(crate) fn store_release(&self, value: u64) {
-        #[cfg(test)]
-        journal::note(self, value);
-        self.0.store(value, Ordering::Release);
+        self.put(value, Ordering::Release);
     }
 }
 
@@ -331,16 +335,14 @@ impl Arena {
     /// The store says whether it sleeps, before it looks for requests one last time.
     pub(crate) fn set_asleep(&self, asleep: bool) {
         if let Some(word) = self.header(at::ASLEEP) {
-            word.store(u64::from(asleep));
+            protocol::set_asleep(word, asleep);
         }
-        fence(Ordering::SeqCst);
     }
 
     /// Whether the store has to be woken for a request that was sent before this call: either this
     /// sees that it sleeps, or its last look sees the request.
     pub(crate) fn is_asleep(&self) -> bool {
-        fence(Ordering::SeqCst);
-        self.header(at::ASLEEP).is_none_or(|word| word.load() != 0)
+        self.header(at::ASLEEP).is_none_or(protocol::is_asleep)
     }
 
     /// The newest version.
@@ -355,26 +357,28 @@ impl Arena {
         self.header(at::OLDEST).map_or(0, Word::load)
     }
 
-    fn root_at(&self, version: u64) -> Option<&[Word]> {
-        let slot = at::ROOTS + (version % ROOT_RING) as usize * ROOT_WORDS;
-        self.from(0)?.get(slot..slot + ROOT_WORDS)
+    #[inline]
+    fn ring(&self) -> Option<Ring<'_, Word, ROOT_WORDS>> {
+        let header = self.from(0)?;
+        Some(Ring {
+            head: header.get(at::HEAD)?,
+            roots: header.get(at::ROOTS..at::SESSIONS)?,
+        })
+    }
+
+    /// The root of a version, the newest version after it was read, and whether the root is kept.
+    fn read_root(&self, version: u64) -> Result<(Root, u64, bool), ReadError> {
+        let read = self.ring().and_then(|ring| ring.read(version));
+        let (words, head, kept) = read.ok_or(ReadError::Damaged { address: 0 })?;
+        Ok((Root::from_words(words), head, kept))
     }
 
     /// Reads the newest version's root.
     pub(crate) fn newest_root(&self) -> Result<Root, ReadError> {
         loop {
             let version = self.head();
-            let slot = self
-                .root_at(version)
-                .ok_or(ReadError::Damaged { address: 0 })?;
-            let mut words = [0; ROOT_WORDS];
-            for (to, from) in words.iter_mut().zip(slot) {
-                *to = from.load();
-            }
-            fence(Ordering::Acquire);
-            // The slot is written over no sooner than when `head` is within one of a ring's turn.
-            if self.head().wrapping_sub(version) < ROOT_RING - 1 {
-                let root = Root::from_words(words);
+            let (root, _, kept) = self.read_root(version)?;
+            if kept {
                 if root.version != version {
                     return Err(ReadError::Damaged {
                         address: at::ROOTS as u64,
@@ -387,18 +391,8 @@ impl Arena {
 
     /// Reads the root of a version, as far back as it is kept.
     pub(crate) fn root_of(&self, version: u64) -> Result<Root, ReadError> {
-        let slot = self
-            .root_at(version)
-            .ok_or(ReadError::Damaged { address: 0 })?;
-        let mut words = [0; ROOT_WORDS];
-        for (to, from) in words.iter_mut().zip(slot) {
-            *to = from.load();
-        }
-        fence(Ordering::Acquire);
-        let head = self.head();
-        let root = Root::from_words(words);
-        // As for the newest: the slot is written over when `head` is within one of a ring's turn.
-        if root.version != version || head.wrapping_sub(version) >= ROOT_RING - 1 {
+        let (root, head, kept) = self.read_root(version)?;
+        if root.version != version || !kept {
             let oldest = self.oldest_root(head);
             return Err(ReadError::SnapshotTooOld {
                 version: Version(version),
@@ -413,7 +407,8 @@ impl Arena {
         let turned = self.head().saturating_sub(ROOT_RING - 2);
         let first = self.oldest().max(turned).max(1);
         let kept = |version: u64| {
-            let slot = self.root_at(version).and_then(<[_]>::first);
+            let slot = (version % ROOT_RING) as usize * ROOT_WORDS;
+            let slot = self.header(at::ROOTS + slot);
             slot.map(Word::load) == Some(version)
         };
         // The versions before a restored one were made in another arena.
@@ -424,22 +419,16 @@ impl Arena {
 
     /// Makes `root` the newest version: one release store, before which nobody sees any of it.
     pub(crate) fn publish(&self, root: &Root) {
-        if let (Some(slot), Some(head)) = (self.root_at(root.version), self.header(at::HEAD)) {
-            // Whoever sees any of this root in the slot sees that `head` has come near it.
-            fence(Ordering::Release);
-            for (to, from) in slot.iter().zip(root.to_words()) {
-                to.store(from);
-            }
-            head.store_release(root.version);
+        if let Some(ring) = self.ring() {
+            ring.publish(root.to_words());
         }
     }
 
     /// Declares versions before `oldest` unreadable, before their memory is written over.
     pub(crate) fn forget_before(&self, oldest: u64) {
         if let Some(word) = self.header(at::OLDEST) {
-            word.store(oldest);
+            protocol::revoke(word, oldest);
         }
-        fence(Ordering::Release);
     }
 
     /// Says in a place for leases which lease it is for, or, with 0, that there is none any more:
@@ -448,9 +437,8 @@ impl Arena {
         if place < LEASES
             && let Some(word) = self.header(at::LEASES + place)
         {
-            word.store(token);
+            protocol::revoke(word, token);
         }
-        fence(Ordering::Release);
     }
 
     /// The place for the answers to a session, where there is one of that number.
@@ -463,17 +451,12 @@ impl Arena {
             .filter(|_| there)
     }
 
-    fn lease_holds(&self, mark: LeaseMark) -> bool {
-        let word = self.header(at::LEASES + mark.place);
-        mark.place < LEASES && word.is_some_and(|word| word.load() == mark.token)
-    }
-
     /// Whether all that was read of `version` up to now was genuine, where the reader may have a
     /// lease of it.
     #[inline]
     pub(crate) fn check(&self, version: u64, lease: Option<LeaseMark>) -> Result<(), ReadError> {
-        fence(Ordering::Acquire);
-        if version >= self.oldest() {
+        let oldest = self.header(at::OLDEST);
+        if oldest.is_none_or(|word| protocol::stands(word, |oldest| version >= oldest)) {
             return Ok(());
         }
         self.check_lease(version, lease)
@@ -481,7 +464,12 @@ impl Arena {
 
     #[cold]
     fn check_lease(&self, version: u64, lease: Option<LeaseMark>) -> Result<(), ReadError> {
-        if lease.is_some_and(|mark| self.lease_holds(mark)) {
+        let holds = |mark: LeaseMark| {
+            let word = self.header(at::LEASES + mark.place);
+            mark.place < LEASES
+                && word.is_some_and(|word| protocol::stands(word, |token| token == mark.token))
+        };
+        if lease.is_some_and(holds) {
             return Ok(());
         }
         Err(ReadError::SnapshotTooOld {

@@ -2,7 +2,8 @@
 //! two processes may see each other's writes.
 
 use super::*;
-use loom::sync::atomic::AtomicU64;
+use crate::arena::Word;
+use crate::arena::protocol::{self, tests::Modelled};
 use loom::thread;
 use proptest::prelude::*;
 use std::sync::Arc;
@@ -116,30 +117,8 @@ proptest! {
     }
 }
 
-/// A word of the model checker, which tries every order in which threads may see it change.
-#[derive(Debug, Default)]
-struct Checked(AtomicU64);
-
-impl Atom for Checked {
-    fn load(&self) -> u64 {
-        self.0.load(Ordering::Relaxed)
-    }
-    fn store(&self, value: u64) {
-        self.0.store(value, Ordering::Relaxed);
-    }
-    fn load_acquire(&self) -> u64 {
-        self.0.load(Ordering::Acquire)
-    }
-    fn store_release(&self, value: u64) {
-        self.0.store(value, Ordering::Release);
-    }
-    fn fence(order: Ordering) {
-        loom::sync::atomic::fence(order);
-    }
-}
-
-fn checked(words: usize) -> Arc<[Checked]> {
-    (0..words).map(|_| Checked::default()).collect()
+fn checked(words: usize) -> Arc<[Modelled]> {
+    Modelled::row(words).into()
 }
 
 #[test]
@@ -187,15 +166,13 @@ fn in_no_order_do_both_sleep() {
                 (Arc::clone(&request), Arc::clone(&slot), Arc::clone(&asleep));
             thread::spawn(move || {
                 assert!(lay(&request, 1, EPOCH, &[1]));
-                let rings = asleep[0].load() != 0;
+                let rings = asleep[0].load(Relaxed) != 0;
                 set_asleep(&request, true);
                 let sleeps = answered(&slot, 1, &mut Vec::new()).is_none();
                 (rings, sleeps)
             })
         };
-        // As `Arena::set_asleep` and the look after it.
-        asleep[0].store(1);
-        Checked::fence(Ordering::SeqCst);
+        protocol::set_asleep(&asleep[0], true);
         let sleeps = state(&request) == 0;
         let mut wakes = false;
         if !sleeps {

@@ -4,10 +4,10 @@
 //!
 //! A sleeper writes nothing, its mapping is read-only; the kernel alone knows of it.
 
-use crate::arena::{Arena, Word};
+use crate::arena::{Arena, Word, protocol};
 use rustix::io::Errno;
 use rustix::thread::futex::{Flags, Timespec, wait, wake};
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::AtomicU32;
 use std::time::Duration;
 
 /// What the kernel calls everybody.
@@ -23,9 +23,7 @@ fn half(word: &Word) -> &AtomicU32 {
 
 /// What the bell says now: to be asked before looking for news.
 pub(super) fn listen(arena: &Arena) -> u32 {
-    arena
-        .bell()
-        .map_or(0, |word| half(word).load(Ordering::Acquire))
+    arena.bell().map_or(0, |word| protocol::listen(half(word)))
 }
 
 /// Sleeps until the bell says something else than `heard`, for `patience` at the most. It may wake
@@ -45,7 +43,7 @@ pub(super) fn sleep(arena: &Arena, heard: u32, patience: Duration) {
 /// The store has news.
 pub(super) fn ring(arena: &Arena) {
     let Some(word) = arena.bell() else { return };
-    half(word).fetch_add(1, Ordering::Release);
+    protocol::ring(half(word));
     if let Err(error) = wake(half(word), Flags::empty(), EVERYBODY) {
         tracing::warn!("waking the agents: {error}");
     }
