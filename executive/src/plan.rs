@@ -2,10 +2,11 @@
 //! owns what the outcome says; it guarantees that each step of a plan is applicable after those
 //! before it, and that the goal holds at the end.
 
+mod narrow;
 mod reason;
 
 use crate::ground::{
-    Environment, Ground, Instance, Operator, Problem, ProblemError, Reached, build,
+    Environment, Ground, Instance, Operator, Problem, ProblemError, Reached, Scope, build,
 };
 use crate::search::{Answer, Effort, Limits, Reachability, search};
 use crate::task::{Micro, from_micro};
@@ -211,14 +212,46 @@ const FEW_SPARES: usize = 2;
 /// Plans for a problem that was read.
 fn solve(problem: &Problem, options: &Options, limits: &mut Limits<'_>) -> Outcome {
     let awake = problem.awake(&options.awake);
-    let reached = match problem.reach(&awake, limits) {
-        Ok(reached) => reached,
-        Err(stop) => {
-            let reason = format!("stopped while grounding: {stop}");
-            return Outcome::without_plan(Status::Limit, reason, limits.expanded());
-        }
+    // A plan of least cost may need any of the actions.
+    let most = match options.effort {
+        Effort::Optimal => usize::MAX,
+        Effort::First | Effort::Anytime => MANY_ACTIONS,
     };
-    let ground = ground(problem, options, &awake, &reached);
+    let stopped = |stop, limits: &Limits<'_>| {
+        let reason = format!("stopped while grounding: {stop}");
+        Outcome::without_plan(Status::Limit, reason, limits.expanded())
+    };
+    let mut reached = match problem.reach(&awake, Scope::All(most), limits) {
+        Ok(reached) => reached,
+        Err(stop) => return stopped(stop, limits),
+    };
+    if reached.overflow {
+        drop(reached);
+        match narrow::plan(problem, options, &awake, limits) {
+            Ok(Some(outcome)) => return outcome,
+            Ok(None) => {}
+            Err(stop) => return stopped(stop, limits),
+        }
+        reached = match problem.reach(&awake, Scope::All(usize::MAX), limits) {
+            Ok(reached) => reached,
+            Err(stop) => return stopped(stop, limits),
+        };
+    }
+    search_in(problem, options, &awake, &reached, limits)
+}
+
+/// More ground actions than this are not made before few of them were tried.
+const MANY_ACTIONS: usize = 100_000;
+
+/// Searches among what was reached.
+fn search_in(
+    problem: &Problem,
+    options: &Options,
+    awake: &[bool],
+    reached: &Reached,
+    limits: &mut Limits<'_>,
+) -> Outcome {
+    let ground = ground(problem, options, awake, reached);
     match search(&ground.task, options.effort, limits) {
         Answer::Solved {
             actions,
@@ -227,13 +260,13 @@ fn solve(problem: &Problem, options: &Options, limits: &mut Limits<'_>) -> Outco
         } => {
             let steps = actions
                 .iter()
-                .map(|&action| step(problem, &reached, &ground, action))
+                .map(|&action| step(problem, reached, &ground, action))
                 .collect();
             Outcome {
                 status: Status::Solved,
                 optimal: optimal
                     && !reached.truncated
-                    && spares_suffice(problem, options, &reached, &ground, cost),
+                    && spares_suffice(problem, options, reached, &ground, cost),
                 cost: Some(from_micro(plain_cost(&ground, &actions))),
                 steps,
                 expanded: limits.expanded(),
@@ -244,7 +277,7 @@ fn solve(problem: &Problem, options: &Options, limits: &mut Limits<'_>) -> Outco
             let spares = Some(options.spares);
             let expanded = limits.expanded();
             let reason =
-                reason::why_unsolvable(problem, options, spares, &reached, &ground, expanded);
+                reason::why_unsolvable(problem, options, spares, reached, &ground, expanded);
             Outcome::without_plan(Status::Unsolvable, reason, expanded)
         }
         Answer::Stopped(stop) => {
@@ -287,9 +320,11 @@ fn ground(problem: &Problem, options: &Options, awake: &[bool], reached: &Reache
 /// The outcome where even the relaxed task does not reach the goal.
 fn prove(problem: &Problem, options: &Options, limits: &mut Limits<'_>) -> Option<Outcome> {
     let awake = problem.awake(&options.awake);
-    let reached = problem.reach(&awake, limits).ok()?;
+    let reached = problem
+        .reach(&awake, Scope::All(MANY_ACTIONS), limits)
+        .ok()?;
     let ground = ground(problem, options, &awake, &reached);
-    if reached.truncated || Reachability::new(&ground.task).goal {
+    if reached.overflow || reached.truncated || Reachability::new(&ground.task).goal {
         return None;
     }
     let expanded = limits.expanded();

@@ -5,6 +5,7 @@
 use super::facts::Facts;
 use super::program::{Environment, Link, Object, Operator, UNBOUND};
 use crate::search::{Limits, StopReason};
+use fixedbitset::FixedBitSet;
 
 /// One step of a join.
 #[derive(Debug, Clone, Copy)]
@@ -29,19 +30,31 @@ pub(crate) struct Found<'l, 'c> {
     /// Bytes that are in use besides.
     bytes: usize,
     tried: u32,
+    /// The only objects that may be bound, where not all may.
+    only: Option<&'l FixedBitSet>,
     limits: &'l mut Limits<'c>,
     pub(crate) stopped: Option<StopReason>,
 }
 
 impl<'l, 'c> Found<'l, 'c> {
-    pub(crate) fn new(bytes: usize, limits: &'l mut Limits<'c>) -> Self {
+    pub(crate) fn new(
+        bytes: usize,
+        only: Option<&'l FixedBitSet>,
+        limits: &'l mut Limits<'c>,
+    ) -> Self {
         Self {
+            only,
             bindings: Vec::new(),
             bytes,
             tried: 0,
             limits,
             stopped: None,
         }
+    }
+
+    fn admits(&self, objects: &[Object]) -> bool {
+        let known = |only: &FixedBitSet| objects.iter().all(|&o| only.contains(o as usize));
+        self.only.is_none_or(known)
     }
 
     fn is_stopped(&mut self) -> bool {
@@ -196,10 +209,11 @@ fn extend(
         return;
     };
     let mut choose = |environment: &mut Environment, slots: &[u32], objects: &[Object]| {
-        let fits = slots
-            .iter()
-            .zip(objects)
-            .all(|(&slot, &object)| bind(operator, facts, environment, slot, object));
+        let fits = found.admits(objects)
+            && slots
+                .iter()
+                .zip(objects)
+                .all(|(&slot, &object)| bind(operator, facts, environment, slot, object));
         if fits {
             extend(operator, facts, rest, environment, found);
         }

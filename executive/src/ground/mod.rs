@@ -19,8 +19,8 @@ mod words;
 mod world;
 
 pub(crate) use build::{Atom, Ground, build};
-pub(crate) use program::{Environment, Object, Operator, Place, UNBOUND, Variable};
-pub(crate) use reach::{Instance, Reached, reach};
+pub(crate) use program::{Environment, Link, Object, Operator, Place, UNBOUND, Variable};
+pub(crate) use reach::{Arrival, Instance, Reached, Scope, reach};
 
 use crate::search::{Limits, StopReason};
 use dsr::{ReadError, Snapshot};
@@ -116,10 +116,11 @@ impl Problem {
             .collect()
     }
 
-    /// Everything that may come to hold.
+    /// What may come to hold.
     pub(crate) fn reach(
         &self,
         awake: &[bool],
+        scope: Scope,
         limits: &mut Limits<'_>,
     ) -> Result<Reached, StopReason> {
         reach(
@@ -128,6 +129,7 @@ impl Problem {
             &self.world,
             &self.spares,
             awake.to_vec(),
+            scope,
             limits,
         )
     }

@@ -11,8 +11,10 @@ use super::value::evaluate;
 use super::world::World;
 use crate::search::{Limits, StopReason};
 use dsr::Value;
-use rustc_hash::FxHashSet;
+use fixedbitset::FixedBitSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::VecDeque;
+use std::collections::hash_map::Entry::Vacant;
 
 /// A place is followed through so many values; beyond, a plan cannot count on it.
 const MOST_VALUES: usize = 64;
@@ -27,9 +29,24 @@ pub(crate) struct Instance {
     pub(crate) spare: usize,
 }
 
+/// How much of what may come to hold is looked for.
+#[derive(Debug, Clone)]
+pub(crate) enum Scope {
+    /// All of it, unless there are more instances than this.
+    All(usize),
+    /// What rules bring about at these objects alone, unless there are more instances than this.
+    At(FixedBitSet, usize),
+    /// Until the goal may hold, with only those instances that first brought about something.
+    Way,
+}
+
 /// What may come to hold.
 #[derive(Debug)]
 pub(crate) struct Reached {
+    /// There are more instances than were asked for: the rest was not looked for.
+    pub(crate) overflow: bool,
+    /// On the way to the goal, the instance that first brought about each fact.
+    pub(crate) achieved: FxHashMap<Arrival, usize>,
     pub(crate) facts: Facts,
     pub(crate) instances: Vec<Instance>,
     /// Bindings at which the goal may hold.
@@ -40,10 +57,22 @@ pub(crate) struct Reached {
     pub(crate) truncated: bool,
 }
 
-#[derive(Debug, Clone, Copy)]
-enum Arrival {
+/// A fact that comes to hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Arrival {
     Type(Object, u16),
     Link(Link),
+}
+
+impl Arrival {
+    fn is_among(self, objects: &FixedBitSet) -> bool {
+        match self {
+            Self::Type(object, _) => objects.contains(object as usize),
+            Self::Link(Link { from, to, .. }) => {
+                objects.contains(from as usize) && objects.contains(to as usize)
+            }
+        }
+    }
 }
 
 struct Reaching<'a> {
@@ -62,6 +91,7 @@ struct Reaching<'a> {
     /// Operators of which later facts may change what they bring about.
     open_ended: Vec<bool>,
     arrivals: VecDeque<Arrival>,
+    scope: Scope,
     /// About how many bytes the bindings take.
     bytes: usize,
     reached: Reached,
@@ -78,6 +108,7 @@ pub(crate) fn reach(
     world: &World,
     spares: &[Vec<Vec<Object>>],
     awake: Vec<bool>,
+    scope: Scope,
     limits: &mut Limits<'_>,
 ) -> Result<Reached, StopReason> {
     let labels = program.vocabulary.labels.len();
@@ -104,6 +135,7 @@ pub(crate) fn reach(
         seen: FxHashSet::default(),
         open_ended: program.operators.iter().map(open_ended).collect(),
         arrivals: VecDeque::new(),
+        scope,
         bytes: 0,
         initial: &world.facts,
         program,
@@ -112,6 +144,8 @@ pub(crate) fn reach(
         by_label,
         by_type,
         reached: Reached {
+            overflow: false,
+            achieved: FxHashMap::default(),
             facts,
             instances: Vec::new(),
             goals: Vec::new(),
@@ -158,6 +192,9 @@ impl<'a> Reaching<'a> {
         loop {
             while let Some(arrival) = self.arrivals.pop_front() {
                 self.arrive(arrival, limits)?;
+                if self.is_enough() {
+                    return Ok(());
+                }
             }
             // Effects on every object of a type, and assigned values, depend on what was reached
             // after their rule was.
@@ -171,6 +208,16 @@ impl<'a> Reaching<'a> {
             if !grew && self.arrivals.is_empty() {
                 return Ok(());
             }
+        }
+    }
+
+    fn is_enough(&mut self) -> bool {
+        match self.scope {
+            Scope::All(most) | Scope::At(_, most) => {
+                self.reached.overflow = self.reached.instances.len() > most;
+                self.reached.overflow
+            }
+            Scope::Way => !self.reached.goals.is_empty(),
         }
     }
 
@@ -189,7 +236,14 @@ impl<'a> Reaching<'a> {
             limits.check(self.bytes)?;
             let operator = self.operator(number);
             let (plan, facts) = (&self.plans[number], &self.reached.facts);
-            let mut found = Found::new(self.bytes, limits);
+            let only = match &self.scope {
+                Scope::At(objects, _) if number < self.program.operators.len() => Some(objects),
+                _ => None,
+            };
+            if only.is_some_and(|objects| !arrival.is_among(objects)) {
+                continue;
+            }
+            let mut found = Found::new(self.bytes, only, limits);
             match arrival {
                 Arrival::Type(object, _) => {
                     plan.with_variable(operator, facts, index, object, &mut found);
@@ -211,12 +265,15 @@ impl<'a> Reaching<'a> {
     fn bound(&mut self, number: usize, found: Vec<Environment>) {
         let operator = self.operator(number);
         for mut environment in found {
-            if self.seen.contains(&(number, environment.clone())) {
-                continue;
+            // On the way to the goal, to see a binding again brings about nothing new.
+            if !matches!(self.scope, Scope::Way) {
+                if self.seen.contains(&(number, environment.clone())) {
+                    continue;
+                }
+                self.seen.insert((number, environment.clone()));
+                // Seen, and kept as an instance with what it changes.
+                self.bytes += 4 * bytes_of_binding(environment.len());
             }
-            self.seen.insert((number, environment.clone()));
-            // Seen, and kept as an instance with what it changes.
-            self.bytes += 4 * bytes_of_binding(environment.len());
             let impossible = |environment: &mut Environment| {
                 let forbidden = operator.absent.iter().any(|link| {
                     self.initial.has_link(link.at(environment))
@@ -256,7 +313,22 @@ impl<'a> Reaching<'a> {
                 objects,
                 spare,
             };
+            let queued = self.arrivals.len();
             self.effects(&instance);
+            if matches!(self.scope, Scope::Way) {
+                let number = self.reached.instances.len();
+                let new: Vec<Arrival> = self.arrivals.drain(queued..).collect();
+                for arrival in new {
+                    if let Vacant(place) = self.reached.achieved.entry(arrival) {
+                        place.insert(number);
+                        self.arrivals.push_back(arrival);
+                    }
+                }
+                if self.arrivals.len() == queued && !self.open_ended[instance.operator] {
+                    continue;
+                }
+                self.bytes += 2 * bytes_of_binding(instance.objects.len());
+            }
             self.reached.instances.push(instance);
         }
         for &woken in &operator.wakes {

@@ -7,7 +7,7 @@
 //! through (values, new nodes, rules that wake others) without axioms, which admissible heuristics
 //! of other planners do not take.
 
-use crate::ground::{Atom, Ground, Place, Problem, ProblemError, Reached, build};
+use crate::ground::{Atom, Ground, Place, Problem, ProblemError, Reached, Scope, build};
 use crate::plan::{Options, Outcome};
 use crate::search::{Limits, StopReason};
 use crate::task::{Action, Fact, Formula, Literal, Micro, State, Task, holds};
@@ -157,7 +157,9 @@ pub fn write(
         ProblemError::Goal(reason) => WriteError::Goal(reason),
     })?;
     let awake = problem.awake(&options.awake);
-    let reached = problem.reach(&awake, limits).map_err(WriteError::Stopped)?;
+    let reached = problem
+        .reach(&awake, Scope::All(usize::MAX), limits)
+        .map_err(WriteError::Stopped)?;
     let initial = &problem.world.facts;
     let ground = build(
         &problem.program,
