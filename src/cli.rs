@@ -8,7 +8,7 @@ mod social;
 
 pub(crate) use bench::{Bench, BenchAction, BenchPeer};
 pub(crate) use graph::{ExportFormat, Graph, GraphAction, GraphSource, Watch};
-pub(crate) use mission::{Mission, MissionAction, SubmitMission};
+pub(crate) use mission::{Mission, MissionAction, SubmitMission, Why};
 pub(crate) use path::{CostModel, Path, PathAlgorithm};
 pub(crate) use social::{Experiment, Social, SocialAction, SocialPicture};
 
@@ -48,7 +48,7 @@ pub(crate) enum Verb {
     #[command(
         after_help = "Without --optimal and --time-limit it prints the first plan it finds.\n\n\
         Examples:\n  cortex plan rules.aggl world.json goal.aggt --optimal\n  \
-        cortex plan --pddl domain.pddl problem.pddl --plan-file plan"
+        cortex plan --instance care goal.aggt\n  cortex plan --pddl domain.pddl problem.pddl --plan-file plan"
     )]
     Plan(Plan),
     /// Submit, list, show, pause, resume and cancel the missions of a running instance
@@ -56,6 +56,13 @@ pub(crate) enum Verb {
         after_help = "Example:\n  cortex mission submit fetch.aggt --priority 2 --deadline 120"
     )]
     Mission(Mission),
+    /// Tell what brought something about: a step, a mission's plans, or an attribute's value
+    #[command(
+        after_help = "WHAT is the name of a mission or a step, or a path as for `cortex graph get`. \
+        Without it: all missions.\n\nExamples:\n  cortex why invite\n  cortex why invite/1/0\n  \
+        cortex why 'robot-in->corridor'\n  cortex why ana.position"
+    )]
+    Why(Why),
     /// Measure how fast it is here
     #[command(after_help = "Example:\n  cortex bench graph --json")]
     Bench(Bench),
@@ -339,21 +346,19 @@ fn binding(text: &str) -> Result<(String, String), String> {
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Plan {
-    /// A grammar (.aggl)
-    #[arg(required_unless_present = "pddl")]
-    pub(crate) domain: Option<PathBuf>,
-    /// A world: graph JSON, RoboComp DSR JSON or AGM model XML
-    #[arg(required_unless_present = "pddl")]
-    pub(crate) world: Option<PathBuf>,
-    /// A goal (.aggt)
-    #[arg(required_unless_present = "pddl")]
-    pub(crate) goal: Option<PathBuf>,
+    /// A grammar (.aggl), a world (graph JSON, RoboComp DSR JSON or AGM model XML) and a goal
+    /// (.aggt); with --instance the goal alone
+    #[arg(value_name = "DOMAIN WORLD GOAL", required_unless_present = "pddl", num_args = 1..=3)]
+    pub(crate) files: Vec<PathBuf>,
+    /// Plan by the rules and from the graph of the running system of this name, and change nothing
+    #[arg(long, value_name = "I", conflicts_with = "pddl")]
+    pub(crate) instance: Option<String>,
     /// Plan for a domain and a problem in PDDL instead
     #[arg(
         long,
         num_args = 2,
         value_names = ["DOMAIN", "PROBLEM"],
-        conflicts_with_all = ["domain", "write_pddl"]
+        conflicts_with_all = ["files", "write_pddl"]
     )]
     pub(crate) pddl: Option<Vec<PathBuf>>,
     /// A plan of least cost, or the proof that there is none

@@ -14,14 +14,17 @@ mod monitor;
 pub mod pddl;
 mod plan;
 pub mod process;
+mod purpose;
 mod search;
 pub mod task;
 #[cfg(test)]
 mod testing;
 
 pub use mission::{
-    Config, Entry, Executive, Mission, MissionSpec, MissionStatus, MissionStep, Planner,
-    Preemption, Request, RulePlanner, StepStatus, missions, missions_with_steps, steps,
+    Cause, Config, Decision, Entry, Executive, Mission, MissionFile, MissionFileError, MissionSpec,
+    MissionStatus, MissionStep, PlannedMission, Planner, Preemption, Request, RulePlanner,
+    Schedule, StepStatus, missions, missions_with_steps, steps,
 };
 pub use plan::{Options, Outcome, Raised, Status, Step, plan};
+pub use purpose::{Purpose, obstacle, purposes};
 pub use search::{Answer, Effort, Limits, Reachability, StopReason, search};

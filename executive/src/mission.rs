@@ -5,20 +5,29 @@
 
 mod adopt;
 mod attend;
+mod culprit;
+mod decision;
+mod file;
+mod outcomes;
 mod pursue;
 pub(crate) mod record;
+mod schedule;
 mod spec;
 #[cfg(test)]
 mod testing;
 
+pub use decision::{Cause, Decision};
+pub use file::{MissionFile, MissionFileError, PlannedMission};
 pub use record::{
     Mission, MissionStatus, Preemption, Request, Step as MissionStep, StepStatus, missions,
     missions_with_steps, steps,
 };
+pub use schedule::Schedule;
 pub use spec::{Config, Entry, MissionSpec, Planner, RulePlanner};
 
-use crate::monitor::Monitor;
-use dsr::{ReadError, Snapshot, Time, Transaction, Version};
+use crate::monitor::{Interest, Monitor};
+use decision::Occasion;
+use dsr::{Change, NodeChange, ReadError, Schema, Snapshot, Time, Transaction, Version};
 use grammar::live::Published;
 use grammar::{Goal, Grammar};
 use std::collections::BTreeMap;
@@ -33,9 +42,15 @@ struct Search {
     /// Since when there has been no plan.
     fruitless: Option<Time>,
     /// What made a new plan necessary.
-    why: String,
+    why: Occasion,
+    /// The version in which nothing was in the plan's way when last looked.
+    sound: Option<Version>,
+    /// What came in its way since.
+    traced: Option<Occasion>,
     /// Whether the mission's reason tells of what is in the way ahead.
     warned: bool,
+    /// Whether a plan ran out without the goal: no more of one is left out then.
+    missed: bool,
 }
 
 /// The executive agent without its process.
@@ -50,6 +65,8 @@ pub struct Executive<P> {
     monitor: Monitor,
     goals: BTreeMap<String, Result<Goal, String>>,
     search: Search,
+    /// What the mission in hand hangs on.
+    interest: Interest,
     journal: Vec<Entry>,
 }
 
@@ -83,6 +100,7 @@ impl<P: Planner> Executive<P> {
             config,
             goals: BTreeMap::new(),
             search: Search::default(),
+            interest: Interest::default(),
             journal: Vec::new(),
         }
     }
@@ -100,6 +118,17 @@ impl<P: Planner> Executive<P> {
         });
     }
 
+    /// Whether a commit can make the next turn decide anything. All that [`Self::step`] last looked
+    /// at for the plan in force counts, and whatever happens to missions, steps and rules. `schema`
+    /// is the graph's after the commit.
+    pub fn concerns(&self, change: &Change, schema: &Schema) -> bool {
+        let own = |node: &NodeChange| {
+            let name = schema.type_name(node.type_id);
+            ["mission", "step", grammar::live::NODE].contains(&name)
+        };
+        change.nodes.iter().any(own) || self.interest.touched_by(change, schema)
+    }
+
     /// One turn: what is to be written, for the store to take in this order. An unchanged world
     /// gives nothing, except where time itself brings something about.
     ///
@@ -115,7 +144,7 @@ impl<P: Planner> Executive<P> {
             transactions.extend(attended);
             return Ok(transactions);
         }
-        let Some(mut before) = self.choose(missions) else {
+        let Some(mut before) = self.choose(now, &missions) else {
             return Ok(transactions);
         };
         before.steps = record::steps(snapshot, before.id)?;
@@ -127,6 +156,7 @@ impl<P: Planner> Executive<P> {
         }
         let mut after = before.clone();
         self.pursue(now, snapshot, &mut after)?;
+        self.interest = self.interest(snapshot, &after)?;
         transactions.extend(record::difference(&before, &after, snapshot.version()));
         transactions.extend(self.wake(snapshot, &before, &after)?);
         Ok(transactions)
@@ -213,14 +243,13 @@ impl<P: Planner> Executive<P> {
     }
 
     /// The mission in hand, else the next one.
-    fn choose(&self, missions: Vec<Mission>) -> Option<Mission> {
-        missions
-            .into_iter()
-            .filter(Mission::is_ready)
-            .min_by_key(|mission| {
-                let waits = mission.status != MissionStatus::Running;
-                (waits, self.rank(mission))
-            })
+    fn choose(&self, now: Time, missions: &[Mission]) -> Option<Mission> {
+        let ready = |mission: &&Mission| mission.is_ready(now, missions);
+        let first = missions.iter().filter(ready).min_by_key(|mission| {
+            let waits = mission.status != MissionStatus::Running;
+            (waits, self.rank(mission))
+        });
+        first.cloned()
     }
 
     /// Missions that are ready are taken in this order: by priority, deadline, place in the list
@@ -283,6 +312,7 @@ impl<P: Planner> Executive<P> {
         drop_open(now, mission, why, None);
         mission.status = status;
         why.clone_into(&mut mission.reason);
+        mission.note(now, status.name(), &Occasion::new(why));
         self.log(
             now,
             format!("mission `{}` {}", mission.name, status.name()),

@@ -2,7 +2,12 @@
 //! hand, and what must hold already now for those after it. This file only judges; what is done
 //! about it is the mission's.
 
+mod interest;
 mod regress;
+mod shortcut;
+
+pub(crate) use interest::Interest;
+pub(crate) use shortcut::shortcut;
 
 use crate::mission::record::{Step, StepStatus};
 use dsr::{ReadError, Snapshot, Time};
@@ -28,6 +33,19 @@ pub(crate) struct Report {
     pub(crate) next: Finding,
 }
 
+impl Report {
+    /// What is in the way of the plan.
+    pub(crate) fn trouble(&self) -> Option<&str> {
+        match &self.next {
+            Finding::Broken(why)
+            | Finding::Sound {
+                ahead: Some(why), ..
+            } => Some(why),
+            _ => None,
+        }
+    }
+}
+
 /// How the first step that is not over stands.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Finding {
@@ -40,6 +58,13 @@ pub(crate) enum Finding {
         /// Why the steps after it will not be possible.
         ahead: Option<String>,
     },
+    /// It and others are needed no more: the one after the first `skipped` can be dispatched.
+    Shortcut {
+        /// So many steps are left out.
+        skipped: usize,
+        /// Of the step after them.
+        binding: BTreeMap<String, String>,
+    },
     /// It is not possible any more.
     Broken(String),
     /// Its agent took too long.
@@ -47,10 +72,10 @@ pub(crate) enum Finding {
 }
 
 /// A step's rule and the nodes that it is bound to.
-struct Ground<'a> {
-    rule: &'a Rule,
-    binding: Binding,
-    missing: Vec<&'a str>,
+pub(crate) struct Ground<'a> {
+    pub(crate) rule: &'a Rule,
+    pub(crate) binding: Binding,
+    pub(crate) missing: Vec<&'a str>,
 }
 
 /// What there is to say of a match: an error in it other than of reading is an obstacle itself.
@@ -231,7 +256,7 @@ fn ahead(
 }
 
 /// `None` where the grammar has no such rule.
-fn ground<'a>(
+pub(crate) fn ground<'a>(
     grammar: &'a Grammar,
     snapshot: &Snapshot,
     step: &'a Step,

@@ -1,14 +1,22 @@
 //! The executive as a process: takes turns, gives its core the graph, and submits what the core
-//! decided. It guarantees that a turn whose snapshot was overtaken is left out, not guessed.
+//! decided. It guarantees that a turn whose snapshot was overtaken is left out, not guessed, and that
+//! running free it looks as soon as a commit concerns it, and not for one that does not.
 
 use crate::{Executive, MissionSpec, Planner, RulePlanner};
-use dsr::{AttachError, Begin, ReadError, Session, Time, TurnError, Version};
+use dsr::{
+    AttachError, Begin, Changes, ClockError, Filter, InstanceError, ReadError, Session, Time,
+    TurnError, Turns, Update, Version,
+};
 use grammar::Grammar;
+use std::time::Duration;
 use thiserror::Error;
 
 /// The core is asked at least so often, seconds, however still the graph is: time-outs and new
 /// attempts at planning do not show in it.
 const PERIOD: f64 = 0.5;
+
+/// How long a wait for a commit lasts at the most: whether the process shall end is asked after it.
+const NAP: Duration = Duration::from_millis(20);
 
 /// Why the executive cannot go on.
 #[derive(Debug, Error)]
@@ -19,6 +27,12 @@ pub enum ProcessError {
     /// There are no turns.
     #[error(transparent)]
     Turn(#[from] TurnError),
+    /// Commits cannot be heard.
+    #[error(transparent)]
+    Instance(#[from] InstanceError),
+    /// The clock cannot be heard.
+    #[error(transparent)]
+    Clock(#[from] ClockError),
     /// The graph's memory is damaged.
     #[error(transparent)]
     Read(#[from] ReadError),
@@ -49,17 +63,17 @@ pub fn run_with<P: Planner>(
     planner: P,
 ) -> Result<(), ProcessError> {
     let mut core = Executive::new(grammar, missions, planner);
-    let mut looked: Option<(Version, Time)> = None;
-    let mut turns = begin()?;
-    while let Some(tick) = turns.next(&mut session)? {
+    let mut looked = None;
+    let changes = session.changes(Filter::default())?;
+    let turns = begin()?;
+    let mut pace = Pace {
+        changes: (!turns.in_lockstep()).then_some(changes),
+        turns,
+        now: None,
+    };
+    while let Some(now) = pace.next(&mut session, &core, looked)? {
         let snapshot = session.snapshot()?;
-        let still = |(version, time)| {
-            version == snapshot.version() && (0.0..PERIOD).contains(&tick.time.since(time))
-        };
-        if looked.is_some_and(still) {
-            continue;
-        }
-        let decided = core.step(tick.time, &snapshot);
+        let decided = core.step(now, &snapshot);
         for entry in core.take_journal() {
             tracing::info!(time = %entry.time, why = entry.why, "{}", entry.what);
         }
@@ -69,14 +83,69 @@ pub fn run_with<P: Planner>(
                 tracing::debug!(
                     "version {version} was overtaken by {oldest}: this turn is left out"
                 );
+                looked = None;
                 continue;
             }
             Err(damaged) => return Err(damaged.into()),
         };
-        looked = Some((snapshot.version(), tick.time));
+        looked = Some((snapshot.version(), now));
         for transaction in &transactions {
-            session.submit(transaction, tick.time)?;
+            session.submit(transaction, now)?;
         }
     }
     Ok(())
+}
+
+/// The version that was looked at last, and when.
+type Looked = Option<(Version, Time)>;
+
+/// What makes the executive look: whoever gives the turns, or else commits that concern it, and the
+/// world's clock.
+struct Pace {
+    turns: Turns,
+    /// `None` in lockstep: any commit since the last turn may concern it.
+    changes: Option<Changes>,
+    /// The newest time of the clock, running free.
+    now: Option<Time>,
+}
+
+impl Pace {
+    /// The time of the next turn; `None` when the process shall end.
+    fn next<P: Planner>(
+        &mut self,
+        session: &mut Session,
+        core: &Executive<P>,
+        looked: Looked,
+    ) -> Result<Option<Time>, ProcessError> {
+        let due = |now: Time| match looked {
+            Some((_, then)) => !(0.0..PERIOD).contains(&now.since(then)),
+            None => true,
+        };
+        let Some(changes) = &mut self.changes else {
+            while let Some(tick) = self.turns.next(session)? {
+                let version = session.snapshot()?.version();
+                if due(tick.time) || looked.is_none_or(|(known, _)| known != version) {
+                    return Ok(Some(tick.time));
+                }
+            }
+            return Ok(None);
+        };
+        while !self.turns.ended() {
+            changes.wait(NAP)?;
+            let snapshot = session.snapshot()?;
+            let mut concerned = false;
+            while let Some(update) = changes.next(snapshot.schema())? {
+                concerned |= match update {
+                    Update::Change(change) => core.concerns(&change, snapshot.schema()),
+                    Update::Gap(_) => true,
+                };
+            }
+            let tick = session.wait_for_tick(Duration::ZERO)?;
+            self.now = tick.map(|tick| tick.time).or(self.now);
+            if let Some(now) = self.now.filter(|now| concerned || due(*now)) {
+                return Ok(Some(now));
+            }
+        }
+        Ok(None)
+    }
 }

@@ -1,4 +1,4 @@
-//! The flags of `cortex mission`. Parsing a flag does nothing but parse it.
+//! The flags of `cortex mission` and `cortex why`. Parsing a flag does nothing but parse it.
 
 use super::seconds;
 use clap::{Args, Subcommand};
@@ -18,8 +18,11 @@ pub(crate) struct Mission {
 
 #[derive(Debug, Clone, Subcommand)]
 pub(crate) enum MissionAction {
-    /// Give the executive a goal
-    #[command(after_help = "Example:\n  cortex mission submit fetch.aggt --priority 2 --wait")]
+    /// Give the executive a goal, or the missions of a file
+    #[command(
+        after_help = "Examples:\n  cortex mission submit fetch.aggt --priority 2 --wait\n  \
+        cortex mission submit round.toml"
+    )]
     Submit(SubmitMission),
     /// List all missions
     #[command(after_help = "Example:\n  cortex mission list --instance default")]
@@ -52,9 +55,10 @@ pub(crate) enum MissionAction {
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct SubmitMission {
-    /// File with the goal, in AGGL
-    #[arg(value_name = "GOAL")]
-    pub(crate) goal: PathBuf,
+    /// File with the goal, in AGGL, or with several missions (.toml), which brings all that the
+    /// flags say
+    #[arg(value_name = "FILE")]
+    pub(crate) file: PathBuf,
     /// Its name, which no other node has [default: that of the file]
     #[arg(long, value_name = "N")]
     pub(crate) name: Option<String>,
@@ -75,4 +79,16 @@ pub(crate) struct SubmitMission {
     /// Wait until it is over; exit code 0 if it succeeded, 1 if not
     #[arg(long)]
     pub(crate) wait: bool,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Why {
+    /// A mission, a step, NODE, NODE.ATTRIBUTE, FROM-LABEL->TO or FROM-LABEL->TO.ATTRIBUTE
+    /// [default: all missions]
+    pub(crate) what: Option<String>,
+    /// For machines
+    #[arg(long)]
+    pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) instance: super::InstanceArgs,
 }

@@ -3,7 +3,7 @@
 use crate::cli::Agent as Arguments;
 use crate::{Answer, Failure};
 use dsr::{AttachError, Begin, Instance, Pace, Session, Turns};
-use executive::{MissionSpec, Preemption};
+use executive::{MissionSpec, Preemption, Schedule};
 use scenarios::{Scenario, Tracks, World};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -135,5 +135,6 @@ fn mission(scenario: &Scenario, mission: &scenarios::scenario::Mission) -> Missi
         priority: mission.priority,
         deadline: mission.deadline.map(|deadline| scenario.start + deadline),
         preemption: preemption.unwrap_or_default(),
+        schedule: Schedule::default(),
     }
 }

@@ -6,9 +6,12 @@ use super::output::{print, print_json};
 use crate::cli::{Mission as Arguments, MissionAction, SubmitMission};
 use crate::{Answer, Failure};
 use dsr::{CommitError, Filter, Precondition, Session, Snapshot, Time, Transaction};
-use executive::{Mission, MissionSpec, MissionStatus, Preemption, Request};
+use executive::{
+    Mission, MissionFile, MissionSpec, MissionStatus, PlannedMission, Preemption, Request, Schedule,
+};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
+use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
@@ -53,6 +56,9 @@ fn as_json(mission: &Mission, now: Time) -> Value {
         "status": mission.status.name(),
         "priority": mission.priority,
         "deadline": mission.deadline.map(|deadline| deadline.since(now)),
+        "begins": mission.schedule.begins.map(|begins| begins.since(now)),
+        "period": mission.schedule.period,
+        "after": mission.schedule.after,
         "preemption": mission.preemption.name(),
         "request": mission.request,
         "replans": mission.replans,
@@ -89,6 +95,18 @@ fn line(mission: &Mission, now: Time, width: usize) -> String {
         mission.status.name(),
         mission.priority
     );
+    let schedule = &mission.schedule;
+    if let Some(left) = schedule.begins.map(|begins| begins.since(now))
+        && left > 0.0
+    {
+        let _ = write!(line, "  begins in {left:.0} s");
+    }
+    if let Some(period) = schedule.period {
+        let _ = write!(line, "  every {period:.0} s");
+    }
+    if let Some(after) = &schedule.after {
+        let _ = write!(line, "  after {after}");
+    }
     if let Some(deadline) = mission.deadline
         && !mission.status.is_over()
     {
@@ -107,7 +125,7 @@ fn show(session: &mut Session, name: &str, machine: bool) -> Result<Answer, Fail
         let mut shown = as_json(&mission, snapshot.time());
         let steps = mission.steps.iter().map(|step| {
             json!({
-                "index": step.index, "rule": step.rule, "binding": step.binding,
+                "name": step.name, "index": step.index, "rule": step.rule, "binding": step.binding,
                 "agent": step.agent, "status": step.status.name(), "reason": step.reason,
             })
         });
@@ -128,54 +146,103 @@ fn show(session: &mut Session, name: &str, machine: bool) -> Result<Answer, Fail
             "" => String::new(),
             why => format!(": {why}"),
         };
-        let (index, status) = (step.index, step.status.name());
-        let _ = writeln!(
-            text,
-            "{index:4}  {status:10}  {step} by {}{why}",
-            step.agent
-        );
+        let (name, status) = (&step.name, step.status.name());
+        let _ = writeln!(text, "{name}  {status:10}  {step} by {}{why}", step.agent);
     }
     print(&text)?;
     Ok(Answer::Yes)
 }
 
 fn submit(session: &mut Session, submit: &SubmitMission, machine: bool) -> Result<Answer, Failure> {
-    let goal = super::read_text(&submit.goal)?;
-    let stem = submit.goal.file_stem().map(|stem| stem.to_string_lossy());
-    let name = submit.name.clone().or(stem.map(Into::into));
-    let name = name.ok_or_else(|| Failure::input("give the mission a --name"))?;
-    let (snapshot, _) = read(session)?;
-    check_goal(&goal, &submit.goal.display().to_string(), &snapshot)?;
-    let taken = snapshot
-        .find_node_by_name(&name)
-        .map_err(Failure::internal)?;
-    if taken.is_some() {
+    let several = submit.file.extension().is_some_and(|end| end == "toml");
+    if several && (submit.name.is_some() || submit.wait) {
         return Err(Failure::input_with_help(
-            format!("there is already a node `{name}`"),
-            "give the mission another name with --name",
+            "a mission file has several missions with names of their own",
+            "leave out --name and --wait",
         ));
     }
+    let snapshot = session.snapshot().map_err(Failure::internal)?;
+    let mut transaction = Transaction::new();
+    let specs = if several {
+        of_file(&snapshot, &submit.file, &mut transaction)?
+    } else {
+        vec![of_goal(&snapshot, submit)?]
+    };
+    for spec in &specs {
+        let taken = snapshot.find_node_by_name(&spec.name);
+        if taken.map_err(Failure::internal)?.is_some() {
+            return Err(Failure::input_with_help(
+                format!("there is already a node `{}`", spec.name),
+                "give the mission another name with --name, or in its file",
+            ));
+        }
+        transaction.create_node("mission", &spec.name, spec.attributes());
+    }
+    commit(session, &transaction, snapshot.time())?;
+    if let [spec] = &specs[..]
+        && submit.wait
+    {
+        return wait(session, &spec.name, machine);
+    }
+    let queued = |spec: &MissionSpec| json!({ "name": spec.name, "status": "queued" });
+    if !machine {
+        let lines = specs
+            .iter()
+            .map(|s| format!("mission {} is queued\n", s.name));
+        print(&lines.collect::<String>())?;
+    } else if several {
+        print_json(&specs.iter().map(queued).collect())?;
+    } else {
+        print_json(&specs.iter().map(queued).next().unwrap_or_default())?;
+    }
+    Ok(Answer::Yes)
+}
+
+/// The mission that the flags describe.
+fn of_goal(snapshot: &Snapshot, submit: &SubmitMission) -> Result<MissionSpec, Failure> {
+    let goal = super::read_text(&submit.file)?;
+    let stem = submit.file.file_stem().map(|stem| stem.to_string_lossy());
+    let name = submit.name.clone().or(stem.map(Into::into));
+    let name = name.ok_or_else(|| Failure::input("give the mission a --name"))?;
+    check_goal(&goal, &submit.file.display().to_string(), snapshot)?;
     let policy = |policy: &Preemption| policy.name() == submit.preemption;
     let preemption = Preemption::ALL.into_iter().find(policy);
-    let spec = MissionSpec {
+    Ok(MissionSpec {
         name,
         goal,
         priority: submit.priority,
         deadline: submit.deadline.map(|seconds| snapshot.time() + seconds),
         preemption: preemption.unwrap_or_default(),
+        schedule: Schedule::default(),
+    })
+}
+
+/// The missions of a file; what puts its rules in force becomes a part of the transaction.
+fn of_file(
+    snapshot: &Snapshot,
+    path: &Path,
+    transaction: &mut Transaction,
+) -> Result<Vec<MissionSpec>, Failure> {
+    let name = path.display().to_string();
+    let file = MissionFile::from_toml(&name, &super::read_text(path)?)
+        .map_err(|error| Failure::Input(error.into()))?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    if let Some(rules) = &file.rules {
+        let path = folder.join(rules);
+        let (grammar, mut diagnostics) = super::read_grammar(&super::read_text(&path)?, &path);
+        diagnostics.extend(grammar.check_schema(snapshot.schema()));
+        if grammar::has_errors(&diagnostics) {
+            return Err(Failure::Input(grammar::Defects { diagnostics }.into()));
+        }
+        *transaction = grammar.publish(snapshot).map_err(Failure::internal)?;
+    }
+    let spec = |mission: &PlannedMission| {
+        let path = folder.join(&mission.goal);
+        let goal = super::read_text(&path)?;
+        check_goal(&goal, &path.display().to_string(), snapshot)?;
+        Ok(mission.spec(snapshot.time(), goal))
     };
-    let mut transaction = Transaction::new();
-    transaction.create_node("mission", &spec.name, spec.attributes());
-    commit(session, &transaction, snapshot.time())?;
-    if submit.wait {
-        return wait(session, &spec.name, machine);
-    }
-    if machine {
-        print_json(&json!({ "name": spec.name, "status": "queued" }))?;
-    } else {
-        print(&format!("mission {} is queued\n", spec.name))?;
-    }
-    Ok(Answer::Yes)
+    file.missions.iter().map(spec).collect()
 }
 
 /// Whether the goal can be read, and says nothing that the graph's schema does not know.
@@ -208,7 +275,7 @@ fn ask(session: &mut Session, name: &str, request: Request) -> Result<Answer, Fa
     let mission = find(missions, name)?;
     let status = mission.status;
     let sensible = match request {
-        Request::Cancel => !status.is_over(),
+        Request::Cancel => mission.can_be_cancelled(),
         Request::Pause => matches!(status, MissionStatus::Queued | MissionStatus::Running),
         Request::Resume => status == MissionStatus::Paused,
     };

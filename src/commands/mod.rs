@@ -13,6 +13,7 @@ mod rules;
 mod run;
 mod social;
 mod store;
+mod why;
 
 pub(crate) use agent::AGENTS;
 
@@ -35,6 +36,7 @@ pub(crate) fn perform(verb: Verb) -> Result<Answer, Failure> {
         Verb::Rules(arguments) => rules::run(&arguments),
         Verb::Plan(arguments) => plan::run(&arguments),
         Verb::Mission(arguments) => mission::run(&arguments),
+        Verb::Why(arguments) => why::run(&arguments),
         Verb::Bench(arguments) => bench::run(&arguments),
         Verb::Path(arguments) => path::run(&arguments),
         Verb::BenchPeer(arguments) => {

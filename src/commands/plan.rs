@@ -1,12 +1,14 @@
 //! `cortex plan`: the steps that lead from a world to a goal, or why there are none.
 
-use super::graph::read_graph;
+use super::graph::{attach, read_graph};
 use super::output::{print, print_json, tell};
 use crate::cli::Plan as Arguments;
 use crate::{Answer, Failure};
+use dsr::{Graph, Image, Schema, Snapshot};
 use executive::pddl::{self, WriteError, Written};
 use executive::{Effort, Limits, Options, Outcome, Status, plan};
-use grammar::SourceFile;
+use grammar::live::Published;
+use grammar::{Grammar, SourceFile};
 use serde_json::json;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -64,17 +66,26 @@ fn by_rules(
     effort: Effort,
     limits: &mut Limits<'_>,
 ) -> Result<(Outcome, Option<Written>), Failure> {
-    let (Some(domain), Some(world), Some(goal)) =
-        (&arguments.domain, &arguments.world, &arguments.goal)
-    else {
-        return Err(Failure::input("a grammar, a world and a goal are needed"));
+    let (grammar, snapshot, goal) = match (arguments.files.as_slice(), &arguments.instance) {
+        ([domain, world, goal], None) => {
+            let grammar = super::load_grammar(&super::read_text(domain)?, domain)?;
+            (grammar, read_graph(world)?.snapshot(), goal)
+        }
+        ([goal], Some(instance)) => {
+            let (grammar, snapshot) = of_instance(instance)?;
+            (grammar, snapshot, goal)
+        }
+        (_, None) => return Err(Failure::input("a grammar, a world and a goal are needed")),
+        (_, Some(_)) => {
+            return Err(Failure::input_with_help(
+                "a running system has its grammar and its world",
+                "give the goal alone",
+            ));
+        }
     };
-    let grammar = super::load_grammar(&super::read_text(domain)?, domain)?;
     let name = goal.display().to_string();
     let goal = grammar::parse_goal(&super::read_text(goal)?, &name, &grammar.types)
         .map_err(|defects| Failure::Input(defects.into()))?;
-    let graph = read_graph(world)?;
-    let snapshot = graph.snapshot();
     let options = Options {
         effort,
         spares: arguments.spares.into(),
@@ -101,6 +112,29 @@ fn by_rules(
     }
     let outcome = plan(&grammar, &snapshot, &goal, &options, limits).map_err(Failure::internal)?;
     Ok((outcome, written))
+}
+
+/// The rules and a copy of the graph of a running system: what is planned with may take longer than
+/// the system keeps a version.
+fn of_instance(name: &str) -> Result<(Grammar, Snapshot), Failure> {
+    let mut session = attach(name)?;
+    let (published, image) = session
+        .read(|snapshot| Ok((Published::find(snapshot)?, Image::of(snapshot)?)))
+        .map_err(Failure::internal)?;
+    let mut graph = Graph::in_memory(Schema::open());
+    graph.restore(&image).map_err(Failure::internal)?;
+    let snapshot = graph.snapshot();
+    let published = published.ok_or_else(|| {
+        Failure::input_with_help(
+            format!("`{name}` goes by no rules"),
+            "load some with `cortex rules load`",
+        )
+    })?;
+    let grammar = published.read(snapshot.schema());
+    Ok((
+        grammar.map_err(|defects| Failure::Input(defects.into()))?,
+        snapshot,
+    ))
 }
 
 fn write_file(path: &Path, text: &str) -> Result<(), Failure> {

@@ -1,14 +1,16 @@
 //! The examples in the book, read by the readers of the program. This file guarantees that what a
 //! page shows as a whole file is one.
 
+use crate::support::Program;
 use crate::tree::{self, assert_none};
 use dsr::Schema;
 use scenarios::Scenario;
 use scenarios::scenario::ProblemKind;
 use std::collections::BTreeSet;
+use std::fs;
 
 /// The contents of a page's fenced blocks in a language, at least one.
-fn blocks(page: &str, language: &str) -> Vec<String> {
+pub(crate) fn blocks(page: &str, language: &str) -> Vec<String> {
     let text = tree::read(&format!("docs/src/{page}.md"));
     let opening = format!("```{language}\n");
     let blocks: Vec<String> = text
@@ -133,4 +135,29 @@ fn the_programs_that_pages_show_are_those_that_are_compiled() {
             assert!(program.contains(&text), "{example} differs");
         }
     }
+}
+
+#[test]
+fn the_plan_of_the_tutorial_is_the_one_that_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let [rules, news, ..] = &blocks("your-own-mission", "aggl")[..] else {
+        panic!("no rules and goal");
+    };
+    let world = &blocks("your-own-mission", "json")[0];
+    let files = [
+        ("home.aggl", rules),
+        ("home.json", world),
+        ("news.aggt", news),
+    ];
+    let paths = files.map(|(name, text)| {
+        let path = folder.path().join(name);
+        fs::write(&path, text).unwrap();
+        path.display().to_string()
+    });
+    let [rules, world, goal] = &paths;
+    assert!(Program::run(&["rules", "check", rules]).status.success());
+    let output = Program::run(&["plan", rules, world, goal]);
+    let told = String::from_utf8(output.stdout).unwrap();
+    let shown = &blocks("your-own-mission", "text")[0];
+    assert!(told.starts_with(shown.as_str()), "{told}");
 }

@@ -2,8 +2,10 @@
 //! answer becomes steps. This file guarantees that a step under way which the new plan begins with
 //! too goes on as the same node, and that no two steps of a mission ever have the same name.
 
+use super::decision::Occasion;
+use super::outcomes;
 use super::record::{Mission, Step};
-use super::{Entry, Executive, MissionStatus, Planner, StepStatus, Turn, drop_open};
+use super::{Executive, MissionStatus, Planner, StepStatus, Turn, drop_open};
 use crate::{Outcome, Raised, Status};
 use dsr::{ReadError, Time};
 use std::collections::BTreeSet;
@@ -27,9 +29,10 @@ impl<P: Planner> Executive<P> {
         let (raised, left_out) = self.failures(turn.now, mission);
         let mut options = self.config.options.clone();
         options.raised.extend(raised);
+        let grammar = outcomes::learned(&self.grammar, turn.snapshot)?;
         let outcome = self
             .planner
-            .plan(&self.grammar, turn.snapshot, turn.goal, &options)?;
+            .plan(&grammar, turn.snapshot, turn.goal, &options)?;
         let sought = match outcome.status {
             Status::Solved => steps(turn.now, &outcome),
             Status::Unsolvable | Status::Limit => {
@@ -86,8 +89,9 @@ impl<P: Planner> Executive<P> {
         now: Time,
         mission: &mut Mission,
         mut planned: Vec<Step>,
-        why: &str,
+        occasion: &Occasion,
     ) {
+        let why = occasion.why.as_str();
         let again = !mission.steps.is_empty();
         mission.replans += u64::from(again);
         mission.status = MissionStatus::Running;
@@ -100,11 +104,8 @@ impl<P: Planner> Executive<P> {
             mission.name,
             words.join(", ")
         );
-        self.journal.push(Entry {
-            time: now,
-            what,
-            why: why.to_owned(),
-        });
+        self.log(now, what, why);
+        mission.note(now, format!("plan {attempt}"), occasion);
 
         let in_hand = mission.steps.iter().position(|step| step.status.is_open());
         let kept = in_hand.filter(|&place| {
@@ -151,6 +152,8 @@ impl<P: Planner> Executive<P> {
         });
         self.search.fruitless = None;
         self.search.warned = false;
+        self.search.sound = None;
+        self.search.traced = None;
     }
 }
 

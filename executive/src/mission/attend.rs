@@ -2,16 +2,10 @@
 //! file guarantees that a step of a mission that no longer has the robot is dropped in the
 //! transaction that takes the robot away.
 
+use super::decision::Occasion;
 use super::record::{self, Mission, Request};
 use super::{Executive, MissionStatus, Planner, Preemption, drop_open};
 use dsr::{ReadError, Snapshot, Time, Transaction};
-
-impl Mission {
-    /// Whether it waits for the robot or has it.
-    pub(super) fn is_ready(&self) -> bool {
-        matches!(self.status, MissionStatus::Queued | MissionStatus::Running)
-    }
-}
 
 impl<P: Planner> Executive<P> {
     /// Does what was asked, ends what is late, and takes the robot from a mission for a more
@@ -30,12 +24,18 @@ impl<P: Planner> Executive<P> {
         for mission in missions.iter_mut() {
             let late = !mission.status.is_over()
                 && mission.deadline.is_some_and(|deadline| now > deadline);
-            if mission.request.is_empty() && !late {
+            let again = mission.is_due_again(now);
+            if mission.request.is_empty() && !late && !again {
                 continue;
             }
             mission.steps = record::steps(snapshot, mission.id)?;
             let before = mission.clone();
             self.answer(now, mission);
+            if again && mission.is_due_again(now) {
+                mission.begin_again(now);
+                let what = format!("mission `{}` is queued", mission.name);
+                self.log(now, what, mission.reason.clone());
+            }
             if late && !mission.status.is_over() {
                 self.finish(now, mission, MissionStatus::Failed, "its deadline passed");
             }
@@ -50,7 +50,9 @@ impl<P: Planner> Executive<P> {
         let running = &missions[at];
         let urgent = missions
             .iter()
-            .filter(|mission| mission.is_ready() && mission.priority > running.priority)
+            .filter(|mission| {
+                mission.is_ready(now, missions) && mission.priority > running.priority
+            })
             .min_by_key(|mission| self.rank(mission));
         let Some(urgent) = urgent.map(|mission| mission.name.clone()) else {
             return Ok(transactions);
@@ -79,7 +81,7 @@ impl<P: Planner> Executive<P> {
             return;
         }
         match (Request::find(&request), mission.status) {
-            (Some(Request::Cancel), status) if !status.is_over() => {
+            (Some(Request::Cancel), _) if mission.can_be_cancelled() => {
                 let why = "cancelled on request";
                 self.finish(now, mission, MissionStatus::Cancelled, why);
             }
@@ -105,6 +107,7 @@ impl<P: Planner> Executive<P> {
         drop_open(now, mission, why, None);
         mission.status = status;
         why.clone_into(&mut mission.reason);
+        mission.note(now, status.name(), &Occasion::new(why));
         let what = format!("mission `{}` is {}", mission.name, status.name());
         self.log(now, what, why);
     }

@@ -2,9 +2,11 @@
 //! over, when its plan goes on, when another is sought, and when it is given up.
 
 use super::adopt::Sought;
+use super::culprit::given_up;
+use super::decision::Occasion;
 use super::record::{Mission, Step};
 use super::{Executive, MissionStatus, Planner, StepStatus, Turn, drop_open};
-use crate::monitor::{Finding, Report};
+use crate::monitor::{Finding, Interest, Report, shortcut};
 use dsr::{ReadError, Snapshot, Time};
 use grammar::MatchError;
 
@@ -49,9 +51,19 @@ impl<P: Planner> Executive<P> {
             mission.status = MissionStatus::Running;
             self.log(now, format!("mission `{}` begins", mission.name), "");
         }
-        if let Some(why) = given_up(mission) {
-            return self.replan(turn, mission, &why);
+        if let Some(occasion) = given_up(turn, mission)? {
+            return self.replan(turn, mission, &occasion);
         }
+        self.follow(turn, mission)
+    }
+
+    /// Goes on with the plan in force, or seeks another.
+    fn follow(&mut self, turn: Turn, mission: &mut Mission) -> Result<(), ReadError> {
+        let Turn {
+            now,
+            snapshot,
+            goal,
+        } = turn;
         let open = open(mission);
         if open.is_empty()
             && mission
@@ -64,32 +76,58 @@ impl<P: Planner> Executive<P> {
         }
         let Report { over, next } =
             self.monitor
-                .judge(&self.grammar, snapshot, now, &open, &goal)?;
+                .judge(&self.grammar, snapshot, now, &open, goal)?;
         self.tick_off(now, mission, over);
+        let may_pass = matches!(next, Finding::Broken(_) | Finding::Sound { .. });
+        let next = if may_pass && !self.search.missed {
+            let found = shortcut(&self.grammar, snapshot, now, &open[over..], goal)?;
+            found.unwrap_or(next)
+        } else {
+            next
+        };
         match next {
             Finding::Finished => {
-                let obstacle = self.grammar.goal_obstacle(snapshot, &goal);
+                let obstacle = self.grammar.goal_obstacle(snapshot, goal);
                 let obstacle = obstacle
                     .ok()
                     .flatten()
                     .map_or_else(String::new, |o| format!(": {o}"));
                 let why = format!("the plan was carried out and the goal does not hold{obstacle}");
-                self.replan(turn, mission, &why)
+                self.search.missed = true;
+                self.replan(turn, mission, &Occasion::new(&why))
             }
-            Finding::Broken(why) => self.replan(turn, mission, &why),
+            Finding::Broken(why) => {
+                let occasion = self.occasion(turn, &open, &why)?;
+                self.replan(turn, mission, &occasion)
+            }
             Finding::TimedOut(why) => {
                 if let Some(step) = mission.steps.iter_mut().find(|step| step.status.is_open()) {
                     step.become_status(StepStatus::Failed, &why, now);
                     let why = format!("{step} failed: {why}");
-                    return self.replan(turn, mission, &why);
+                    return self.replan(turn, mission, &Occasion::new(&why));
                 }
+                Ok(())
+            }
+            Finding::Shortcut { skipped, binding } => {
+                self.is_sound(turn);
+                self.skip(now, mission, skipped);
+                self.dispatch(now, mission, binding);
                 Ok(())
             }
             Finding::Sound { dispatch, ahead } => {
                 match ahead {
-                    Some(why) if self.replace(turn, mission, &why)? => return Ok(()),
-                    None if std::mem::take(&mut self.search.warned) => mission.reason.clear(),
-                    _ => {}
+                    Some(why) => {
+                        let occasion = self.occasion(turn, &open, &why)?;
+                        if self.replace(turn, mission, &occasion)? {
+                            return Ok(());
+                        }
+                    }
+                    None => {
+                        self.is_sound(turn);
+                        if std::mem::take(&mut self.search.warned) {
+                            mission.reason.clear();
+                        }
+                    }
                 }
                 if let Some(binding) = dispatch {
                     self.dispatch(now, mission, binding);
@@ -99,11 +137,48 @@ impl<P: Planner> Executive<P> {
         }
     }
 
+    /// What the next turn hangs on where nothing else happens to the mission.
+    pub(super) fn interest(
+        &mut self,
+        snapshot: &Snapshot,
+        mission: &Mission,
+    ) -> Result<Interest, ReadError> {
+        match self.goal(&mission.goal) {
+            Ok(goal) => Interest::of(&self.grammar, snapshot, &open(mission), &goal),
+            Err(_) => Ok(Interest::default()),
+        }
+    }
+
+    /// Drops the first `skipped` open steps: the one after them is possible already.
+    fn skip(&mut self, now: Time, mission: &mut Mission, skipped: usize) {
+        let mut open = mission
+            .steps
+            .iter_mut()
+            .filter(|step| step.status.is_open());
+        let passed: Vec<&mut Step> = open.by_ref().take(skipped).collect();
+        let Some(next) = open.next().map(|step| step.to_string()) else {
+            return;
+        };
+        let why = format!("{next} is possible already");
+        for step in passed {
+            step.become_status(StepStatus::Dropped, &why, now);
+        }
+        let what = format!("{skipped} steps are left out");
+        mission.note(now, what.clone(), &Occasion::new(&why));
+        self.log(now, format!("mission `{}`: {what}", mission.name), why);
+    }
+
     /// Plans anew where the plan in force, if there is one, cannot go on.
-    fn replan(&mut self, turn: Turn, mission: &mut Mission, why: &str) -> Result<(), ReadError> {
-        why.clone_into(&mut self.search.why);
+    fn replan(
+        &mut self,
+        turn: Turn,
+        mission: &mut Mission,
+        occasion: &Occasion,
+    ) -> Result<(), ReadError> {
+        let why = occasion.why.as_str();
+        self.search.why.clone_from(occasion);
         match self.seek(turn, mission)? {
-            Sought::Plan(steps) => self.adopt(turn.now, mission, steps, why),
+            Sought::Plan(steps) => self.adopt(turn.now, mission, steps, occasion),
             Sought::Nothing(reason) => {
                 drop_open(turn.now, mission, why, None);
                 let since = *self.search.fruitless.get_or_insert(turn.now);
@@ -111,11 +186,13 @@ impl<P: Planner> Executive<P> {
                     self.finish(turn.now, mission, MissionStatus::Failed, &reason);
                 } else if mission.reason != reason {
                     mission.reason.clone_from(&reason);
-                    self.log(
-                        turn.now,
-                        format!("mission `{}` waits", mission.name),
-                        reason,
-                    );
+                    let noted = Occasion {
+                        why: reason.clone(),
+                        cause: occasion.cause.clone(),
+                    };
+                    mission.note(turn.now, "waits", &noted);
+                    let what = format!("mission `{}` waits", mission.name);
+                    self.log(turn.now, what, reason);
                 }
             }
             Sought::NotNow => drop_open(turn.now, mission, why, None),
@@ -125,20 +202,31 @@ impl<P: Planner> Executive<P> {
 
     /// Plans anew where the plan in force will come to nothing; whether there is another. If there
     /// is none, the step in hand goes on: what is in the way may go before its turn comes.
-    fn replace(&mut self, turn: Turn, mission: &mut Mission, why: &str) -> Result<bool, ReadError> {
+    fn replace(
+        &mut self,
+        turn: Turn,
+        mission: &mut Mission,
+        occasion: &Occasion,
+    ) -> Result<bool, ReadError> {
         match self.seek(turn, mission)? {
             // The planner sees a way where the monitor does not: the planner looks closer.
             Sought::Plan(steps) if same(&steps, &open(mission)) => Ok(false),
             Sought::Plan(steps) => {
-                self.adopt(turn.now, mission, steps, why);
+                self.adopt(turn.now, mission, steps, occasion);
                 Ok(true)
             }
             Sought::Nothing(reason) => {
-                let reason = format!("{why}; {reason}");
+                let reason = format!("{}; {reason}", occasion.why);
                 self.search.warned = true;
                 if mission.reason != reason {
                     mission.reason.clone_from(&reason);
-                    self.log(turn.now, "the step in hand goes on".to_owned(), reason);
+                    let what = "the step in hand goes on";
+                    let noted = Occasion {
+                        why: reason.clone(),
+                        cause: occasion.cause.clone(),
+                    };
+                    mission.note(turn.now, what, &noted);
+                    self.log(turn.now, what.to_owned(), reason);
                 }
                 Ok(false)
             }
@@ -162,17 +250,5 @@ fn same(one: &[Step], other: &[Step]) -> bool {
     one.len() == other.len() && one.iter().zip(other).all(step)
 }
 
-/// Why the plan in force is over, if its agent has given up a step of it.
-fn given_up(mission: &Mission) -> Option<String> {
-    let first = mission.steps.iter().position(|step| step.status.is_open());
-    let first = first.unwrap_or(mission.steps.len());
-    if mission
-        .steps
-        .get(first)
-        .is_some_and(|step| step.status.is_under_way())
-    {
-        return None;
-    }
-    let last = mission.steps.get(first.checked_sub(1)?)?;
-    (last.status == StepStatus::Failed).then(|| format!("{last} failed: {}", last.reason))
-}
+#[cfg(test)]
+mod tests;

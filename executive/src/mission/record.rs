@@ -2,6 +2,8 @@
 //! two. This file guarantees that what did not change is not written, and that a change is refused
 //! by the store where somebody else changed the same node since it was read.
 
+use super::decision::{self, Decision, Occasion};
+use super::schedule::Schedule;
 use dsr::{
     Node, NodeId, NodeRef, Operation, Owner, Precondition, ReadError, Snapshot, Time, Transaction,
     Value, Version,
@@ -177,14 +179,30 @@ pub struct Mission {
     pub deadline: Option<Time>,
     /// When it gives way to one of higher priority.
     pub preemption: Preemption,
+    /// When it begins.
+    pub schedule: Schedule,
     /// What somebody asks of it and the executive has not done yet, as written.
     pub request: String,
     /// How many plans followed the first one.
     pub replans: u64,
     /// Why it stands as it does; empty where that is plain.
     pub reason: String,
+    /// What was decided about it, as the graph has it; see [`Self::decisions`].
+    pub(crate) decided: String,
     /// By ascending index.
     pub steps: Vec<Step>,
+}
+
+impl Mission {
+    /// What was decided about it lately, oldest first.
+    pub fn decisions(&self) -> Vec<Decision> {
+        decision::parse(&self.decided)
+    }
+
+    /// Adds a decision.
+    pub(super) fn note(&mut self, now: Time, what: impl Into<String>, occasion: &Occasion) {
+        decision::note(&mut self.decided, now, what.into(), occasion);
+    }
 }
 
 /// A `step` node.
@@ -210,15 +228,25 @@ pub struct Step {
     pub reason: String,
 }
 
-impl fmt::Display for Step {
+/// A rule at a binding of variables to names of nodes.
+pub(super) struct Applied<'a>(pub(super) &'a str, pub(super) &'a BTreeMap<String, String>);
+
+impl fmt::Display for Applied<'_> {
     /// `changeRoom(robot=shelly, room1=hall, room2=kitchen)`
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}(", self.rule)?;
-        for (index, (variable, node)) in self.binding.iter().enumerate() {
+        write!(f, "{}(", self.0)?;
+        for (index, (variable, node)) in self.1.iter().enumerate() {
             let comma = if index == 0 { "" } else { ", " };
             write!(f, "{comma}{variable}={node}")?;
         }
         f.write_str(")")
+    }
+}
+
+impl fmt::Display for Step {
+    /// As [`Cause::rules`](super::Cause::rules) has it.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        Applied(&self.rule, &self.binding).fmt(f)
     }
 }
 
@@ -250,6 +278,11 @@ fn text(node: &Node, name: &str) -> Result<String, ReadError> {
         .unwrap_or_default())
 }
 
+fn seconds(node: &Node, name: &str) -> Result<Option<f64>, ReadError> {
+    let value = node.value(name)?.and_then(|value| value.as_f64());
+    Ok(value.filter(|seconds| seconds.is_finite()))
+}
+
 fn count(node: &Node, name: &str) -> Result<u64, ReadError> {
     Ok(node
         .value(name)?
@@ -274,7 +307,6 @@ pub fn missions(snapshot: &Snapshot) -> Result<Vec<Mission>, ReadError> {
             Some(Value::I64(priority)) => priority,
             _ => 0,
         };
-        let deadline = node.value("deadline")?.and_then(|value| value.as_f64());
         let preemption = text(&node, "preemption")?;
         let preemption = Preemption::ALL
             .into_iter()
@@ -285,11 +317,17 @@ pub fn missions(snapshot: &Snapshot) -> Result<Vec<Mission>, ReadError> {
             goal: text(&node, "goal")?,
             status: known.unwrap_or(MissionStatus::Queued),
             priority,
-            deadline: deadline.map(Time::from_seconds),
+            deadline: seconds(&node, "deadline")?.map(Time::from_seconds),
             preemption: preemption.unwrap_or_default(),
+            schedule: Schedule {
+                begins: seconds(&node, "begins")?.map(Time::from_seconds),
+                period: seconds(&node, "period")?,
+                after: Some(text(&node, "after")?).filter(|name| !name.is_empty()),
+            },
             request: text(&node, "request")?,
             replans: count(&node, "replans")?,
             reason: text(&node, "reason")?,
+            decided: text(&node, "decisions")?,
             steps: Vec::new(),
         });
     }
@@ -365,6 +403,18 @@ pub(crate) fn difference(before: &Mission, after: &Mission, seen: Version) -> Op
     }
     if before.request != after.request {
         transaction.set(mission.clone(), "request", after.request.as_str());
+    }
+    let times = [
+        ("begins", before.schedule.begins, after.schedule.begins),
+        ("deadline", before.deadline, after.deadline),
+    ];
+    for (name, old, new) in times {
+        if let Some(new) = new.filter(|_| new != old) {
+            transaction.set(mission.clone(), name, new.seconds());
+        }
+    }
+    if before.decided != after.decided {
+        transaction.set(mission.clone(), "decisions", after.decided.as_str());
     }
     if before.replans != after.replans {
         transaction.set(mission.clone(), "replans", Value::U64(after.replans));

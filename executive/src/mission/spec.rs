@@ -1,13 +1,13 @@
 //! What the executive is given and what it tells: missions, settings, a planner, its journal. This
 //! file owns the figures that decide how long it waits and how often it tries.
 
-use super::{MissionStatus, Preemption};
-use crate::{Limits, Options, Outcome};
+use super::{MissionStatus, Preemption, Schedule};
+use crate::{Effort, Limits, Options, Outcome};
 use dsr::{ReadError, Snapshot, Time, Value};
 use grammar::{Goal, Grammar};
 
 /// What a scenario wants done.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct MissionSpec {
     /// Unique; the name of its node.
     pub name: String,
@@ -19,6 +19,8 @@ pub struct MissionSpec {
     pub deadline: Option<Time>,
     /// When it gives way to one of higher priority.
     pub preemption: Preemption,
+    /// When it begins.
+    pub schedule: Schedule,
 }
 
 impl MissionSpec {
@@ -39,6 +41,7 @@ impl MissionSpec {
         others
             .into_iter()
             .chain(deadline)
+            .chain(self.schedule.attributes())
             .map(|(name, value)| (name.to_owned(), value))
             .collect()
     }
@@ -111,7 +114,11 @@ pub struct Config {
 impl Default for Config {
     fn default() -> Self {
         Self {
-            options: Options::default(),
+            // A robot that waits for the best plan does nothing meanwhile.
+            options: Options {
+                effort: Effort::First,
+                ..Options::default()
+            },
             retry: 1.0,
             patience: 15.0,
             pause: 0.5,

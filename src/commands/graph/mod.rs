@@ -13,6 +13,7 @@ mod transform;
 mod watch;
 mod write;
 
+pub(super) use path::{Path, Thing};
 pub(crate) use source::{attach, no_such, read_graph};
 
 use crate::cli::{Graph as Arguments, GraphAction};

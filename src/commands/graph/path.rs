@@ -7,17 +7,17 @@ use dsr::{Attribute, AttributeId, EdgeKey, EdgeRef, NodeId, Owner, ReadError, Sn
 
 /// A node or an edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Thing {
+pub(in crate::commands) enum Thing {
     Node(NodeId),
     Edge(EdgeKey),
 }
 
 /// What a path names.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Path {
-    pub(super) thing: Thing,
+pub(in crate::commands) struct Path {
+    pub(in crate::commands) thing: Thing,
     /// The name of an attribute, which the thing need not have.
-    pub(super) attribute: Option<String>,
+    pub(in crate::commands) attribute: Option<String>,
 }
 
 impl Thing {
@@ -32,7 +32,7 @@ impl Thing {
     }
 
     /// As messages name it.
-    pub(super) fn describe(self, snapshot: &Snapshot) -> String {
+    pub(in crate::commands) fn describe(self, snapshot: &Snapshot) -> String {
         match self {
             Self::Node(id) => name_of(snapshot, id),
             Self::Edge(key) => {
@@ -43,7 +43,7 @@ impl Thing {
         }
     }
 
-    pub(super) fn attribute(
+    pub(in crate::commands) fn attribute(
         self,
         snapshot: &Snapshot,
         name: AttributeId,
@@ -86,7 +86,7 @@ fn attribute_of(text: &str) -> Option<(&str, String)> {
 }
 
 impl Path {
-    pub(super) fn find(snapshot: &Snapshot, path: &str) -> Result<Self, Failure> {
+    pub(in crate::commands) fn find(snapshot: &Snapshot, path: &str) -> Result<Self, Failure> {
         match path.split_once("->") {
             Some((start, to)) => edge(snapshot, path, start, to),
             None => {

@@ -1,7 +1,7 @@
 //! Missions that are asked to wait or end, that are late, and that give way.
 
 use crate::mission::testing::{Agent, GO_TO_WARD, GREET_ANA, House};
-use crate::{MissionSpec, Preemption};
+use crate::{MissionSpec, Preemption, Schedule};
 use dsr::Value;
 use expect_test::expect;
 
@@ -76,6 +76,7 @@ fn preempted(preemption: Preemption) -> Vec<String> {
         priority: 1,
         deadline: None,
         preemption: Preemption::Never,
+        schedule: Schedule::default(),
     };
     house.change(|transaction| {
         transaction.create_node("mission", "urgent", urgent.attributes());

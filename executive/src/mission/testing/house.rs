@@ -7,8 +7,11 @@
 
 use super::RULES;
 use crate::testing::{centre, read};
-use crate::{Config, Executive, MissionSpec, Options, Outcome, Planner, Preemption, RulePlanner};
-use dsr::{EdgeKey, Graph, Node, NodeId, ReadError, Snapshot, Time, Transaction, Value};
+use crate::{
+    Config, Decision, Executive, MissionSpec, Options, Outcome, Planner, Preemption, RulePlanner,
+    Schedule,
+};
+use dsr::{Change, EdgeKey, Graph, Node, NodeId, ReadError, Snapshot, Time, Transaction, Value};
 use grammar::{Goal, Grammar};
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -75,6 +78,7 @@ impl House {
                     priority,
                     deadline: None,
                     preemption: Preemption::default(),
+                    schedule: Schedule::default(),
                 }
             })
             .collect();
@@ -111,10 +115,25 @@ impl House {
     }
 
     /// Somebody changes the graph.
-    pub(in crate::mission) fn change(&mut self, change: impl FnOnce(&mut Transaction)) {
+    pub(in crate::mission) fn change(&mut self, change: impl FnOnce(&mut Transaction)) -> Change {
+        self.try_change(change).unwrap()
+    }
+
+    /// The same, of what the schema may forbid.
+    pub(in crate::mission) fn try_change(
+        &mut self,
+        change: impl FnOnce(&mut Transaction),
+    ) -> Option<Change> {
         let mut transaction = Transaction::new();
         change(&mut transaction);
-        self.graph.commit(&transaction, "world", self.now).unwrap();
+        let committed = self.graph.commit(&transaction, "world", self.now);
+        committed.ok().map(|(_, change)| change)
+    }
+
+    /// Somebody submits a mission.
+    pub(in crate::mission) fn submit(&mut self, name: &str, goal: &str) {
+        let goal = vec![("goal".to_owned(), goal.into())];
+        self.change(|transaction| transaction.create_node("mission", name, goal));
     }
 
     /// The door is closed.
@@ -216,6 +235,13 @@ impl House {
             .unwrap();
         let (status, reason) = (text(&mission, "status"), text(&mission, "reason"));
         format!("{status}, {replans}: {reason}")
+    }
+
+    /// What was decided about the mission.
+    pub(in crate::mission) fn decisions(&self, name: &str) -> Vec<Decision> {
+        let missions = crate::missions(&self.graph.snapshot()).unwrap();
+        let mission = missions.into_iter().find(|mission| mission.name == name);
+        mission.unwrap().decisions()
     }
 
     /// The steps in their order, as `name rule(nodes) status: reason`.
