@@ -64,6 +64,8 @@ impl Hall {
         let mut child = Command::new(program)
             .args(["bench-peer", role, self.instance.name()])
             .args(numbers.iter().map(ToString::to_string))
+            // What a peer logs is no part of the figures.
+            .env("RUST_LOG", "warn")
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()

@@ -18,6 +18,7 @@ mod indoor;
 mod peer;
 mod plan;
 mod reads;
+mod replan;
 mod replica;
 mod rules;
 mod whole;

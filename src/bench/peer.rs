@@ -39,12 +39,14 @@ pub(crate) fn play(role: &str, instance: &str, numbers: &[u64]) -> Result<Answer
         "join" => join(&instance, false),
         "copy" => join(&instance, true),
         "pairs" => pairs(&instance),
+        "indoor" => super::replan::indoor(&instance),
+        "executive" => super::replan::executive(&instance),
         other => Err(Failure::input(format!("no role `{other}`"))),
     }?;
     Ok(Answer::Yes)
 }
 
-fn say(line: &str) -> Result<(), Failure> {
+pub(super) fn say(line: &str) -> Result<(), Failure> {
     let mut output = std::io::stdout().lock();
     let said = output.write_all(format!("{line}\n").as_bytes());
     said.and_then(|()| output.flush())
@@ -52,7 +54,7 @@ fn say(line: &str) -> Result<(), Failure> {
 }
 
 /// True once standard input has ended.
-fn end_of_input() -> Arc<AtomicBool> {
+pub(super) fn end_of_input() -> Arc<AtomicBool> {
     let ended = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&ended);
     std::thread::spawn(move || {
@@ -69,7 +71,7 @@ pub(super) fn clock() -> u64 {
     time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64
 }
 
-fn attach(instance: &Instance, agent: &str) -> Result<Session, Failure> {
+pub(super) fn attach(instance: &Instance, agent: &str) -> Result<Session, Failure> {
     Session::attach(instance, agent, PATIENCE).map_err(Failure::internal)
 }
 

@@ -16,7 +16,7 @@ const R10: Size = Size {
     deliveries: 1,
     informed: 1,
 };
-const R50: Size = Size {
+pub(super) const R50: Size = Size {
     rooms: 50,
     people: 20,
     deliveries: 2,
@@ -138,6 +138,7 @@ pub(crate) fn plans(folder: Option<&Path>) -> Result<Vec<Figure>, Failure> {
         raw: Some(few),
         peer: "5 new nodes offered to each rule".to_owned(),
     });
+    figures.push(super::replan::live()?);
     Ok(figures)
 }
 
