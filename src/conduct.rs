@@ -4,7 +4,7 @@
 
 use crate::progress::Progress;
 use crate::supervise::{Hold, Notice, Policy, Program, SuperviseError, Supervisor};
-use dsr::{Image, Instance, ReadError, Session, Subscriber, Tick, Time};
+use dsr::{Image, Instance, ReadError, Session, Snapshot, Subscriber, Tick, Time};
 use executive::{Mission, MissionStatus};
 use scenarios::process::{TICK, TRUTH, tick_time};
 use scenarios::{Scenario, Truth};
@@ -321,16 +321,23 @@ impl<'a> Conductor<'a> {
     }
 
     fn missions_are_over(&mut self, show: bool) -> Result<bool, ConductError> {
-        let missions = self.session.read(executive::missions_with_steps)?;
+        // Steps are shown, and reported at the end; whether missions are over does not need them.
+        let missions = self.session.read(executive::missions)?;
         if show {
+            let what = missions.iter().find(|m| m.status == MissionStatus::Running);
+            let id = what.map(|mission| mission.id);
+            let in_hand = |snapshot: &Snapshot| match id {
+                Some(id) => executive::steps(snapshot, id),
+                None => Ok(Vec::new()),
+            };
+            let steps = self.session.read(in_hand)?;
             let start = self.start;
             let now = self
                 .recording
                 .truths
                 .last()
                 .map_or(0.0, |truth| truth.time.since(start));
-            let what = missions.iter().find(|m| m.status == MissionStatus::Running);
-            let step = what.and_then(|m| m.steps.iter().rfind(|s| s.status.is_under_way()));
+            let step = steps.iter().rfind(|step| step.status.is_under_way());
             let text = match (what, step) {
                 (Some(mission), Some(step)) => format!("{}: {}", mission.name, step.rule),
                 (Some(mission), None) => mission.name.clone(),
@@ -359,7 +366,8 @@ impl<'a> Conductor<'a> {
             }
         }
         let all = missions.len() >= self.settings.scenario.missions.len();
-        let ended = all && missions.iter().all(|mission| mission.status.is_over());
+        let at_end = |mission: &Mission| mission.status.is_over() && !mission.recurs();
+        let ended = all && missions.iter().all(at_end);
         self.recording.missions = missions;
         Ok(ended)
     }
