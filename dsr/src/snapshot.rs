@@ -6,14 +6,16 @@ mod element;
 mod geometry;
 mod past;
 mod petgraph;
+mod scan;
 
 pub use element::{Attribute, Edge, Element, Node};
 pub use geometry::TransformError;
 pub use petgraph::{Edges, Neighbors};
+pub use scan::NodeIds;
 
 use crate::arena::record;
 use crate::arena::tree::{self, Key};
-use crate::arena::{Address, Arena, LeaseMark, ReadError, Root, Word, trie};
+use crate::arena::{Address, Arena, LeaseMark, ReadError, Root, Word, cells, trie};
 use crate::hot::Hot;
 use crate::shm::Segment;
 use crate::value::{hash, place};
@@ -185,7 +187,7 @@ impl Snapshot {
     /// [`ReadError::SnapshotTooOld`].
     #[inline]
     pub fn check(&self) -> Result<(), ReadError> {
-        self.arena.check(self.root.version, self.lease)
+        self.arena.check(self.root.version, self.lease.as_ref())
     }
 
     /// Turns the outcome of a walk through the arena into what the caller may see.
@@ -197,9 +199,10 @@ impl Snapshot {
         }
     }
 
-    #[cold]
+    #[inline]
     pub(in crate::snapshot) fn broken(&self, address: Address) -> ReadError {
-        self.arena.broken(self.root.version, self.lease, address)
+        let lease = self.lease.as_ref();
+        self.arena.broken(self.root.version, lease, address)
     }
 
     /// The node whose record begins with `words`; not yet known to be genuine.
@@ -217,10 +220,19 @@ impl Snapshot {
     /// [`ReadError`], as for every read of a snapshot.
     #[inline]
     pub fn find_node(&self, id: NodeId) -> Result<Option<Node<'_>>, ReadError> {
-        let found = match trie::find(&self.arena, self.root.nodes, id.0) {
-            Ok(Some((address, words))) => self.node_at(address, words),
-            Ok(None) => return self.check().map(|()| None),
-            Err(address) => Err(address),
+        let found = match cells::find(&self.arena, &self.root, id.0) {
+            Some((address, words)) => self.node_at(address, words),
+            None => match trie::find(&self.arena, self.root.nodes, id.0) {
+                Ok(Some(address)) => {
+                    let words = self.arena.from(address).unwrap_or(&[]);
+                    self.node_at(address, words)
+                }
+                Ok(None) => {
+                    self.check()?;
+                    return Ok(None);
+                }
+                Err(address) => Err(address),
+            },
         };
         match found {
             Ok(node) => {
@@ -306,10 +318,7 @@ impl Snapshot {
     pub fn ids_of_type(&self, exact: TypeId) -> NodeIds<'_> {
         let entry = record::directory_entry(&self.arena, self.root.types, exact.0);
         let root = self.genuine(entry).map(|(tree, _)| tree);
-        NodeIds {
-            scan: self.scan(root, [0, 0], [u64::MAX, u64::MAX]),
-            word: 0,
-        }
+        NodeIds::new(self.scan(root, [0, 0], [u64::MAX, u64::MAX]), 0)
     }
 
     /// How many nodes are of a type, but not of its subtypes.
@@ -334,10 +343,7 @@ impl Snapshot {
             ValueRange::Between(from, to) => Some((place(*from), place(*to))),
         };
         let (root, (from, to)) = places.map_or((Ok(0), (0, 0)), |places| (root, places));
-        NodeIds {
-            scan: self.scan(root, [from, 0], [to, u64::MAX]),
-            word: 1,
-        }
+        NodeIds::new(self.scan(root, [from, 0], [to, u64::MAX]), 1)
     }
 
     /// How many edges of a label join nodes of which exact types, by types.
@@ -397,14 +403,6 @@ impl Snapshot {
         Ok(self.genuine(entry)?.1)
     }
 
-    fn scan(&self, root: Result<Address, ReadError>, from: Key, to: Key) -> Scan<'_> {
-        let range = root.and_then(|root| self.range(root, from, to));
-        Scan {
-            snapshot: self,
-            range: Some(range),
-        }
-    }
-
     /// The edge of that key, if it is there.
     ///
     /// # Errors
@@ -442,44 +440,5 @@ impl Snapshot {
         postcard::from_bytes(&bytes).map_err(|_| ReadError::Damaged {
             address: self.root.writers,
         })
-    }
-}
-
-/// Ids of nodes, one after another.
-#[derive(Debug)]
-pub struct NodeIds<'a> {
-    scan: Scan<'a>,
-    /// Which word of the keys is the id.
-    word: usize,
-}
-
-impl Iterator for NodeIds<'_> {
-    type Item = Result<NodeId, ReadError>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let entry = self.scan.next()?;
-        Some(entry.map(|(key, _)| NodeId(key[self.word])))
-    }
-}
-
-/// Walks a part of a tree.
-#[derive(Debug)]
-struct Scan<'a> {
-    snapshot: &'a Snapshot,
-    range: Option<Result<tree::Range<'a>, ReadError>>,
-}
-
-impl Iterator for Scan<'_> {
-    type Item = Result<tree::Entry, ReadError>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let next = match self.range.as_mut()? {
-            Ok(range) => self.snapshot.genuine(range.next()),
-            Err(error) => Err(*error),
-        };
-        if !matches!(next, Ok(Some(_))) {
-            self.range = None;
-        }
-        next.transpose()
     }
 }

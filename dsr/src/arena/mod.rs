@@ -6,13 +6,16 @@
 //! Every structure behind a root is immutable once the root's version is published: a commit
 //! writes new blocks along the paths that it changes and shares the rest. A block that no version
 //! newer than `v` can reach is written over only after `oldest` was raised above `v`. So a reader
-//! reads, then looks at `oldest`: if its version is not older, all that it read was genuine.
+//! reads, then looks at `oldest`: if its version is not older, all that it read was genuine. The cells
+//! alone change in place, see the file `cells`.
 
 pub(crate) mod allocator;
+pub(crate) mod cells;
 #[cfg(test)]
 pub(crate) mod journal;
 pub(crate) mod protocol;
 pub(crate) mod record;
+mod root;
 mod sessions;
 pub(crate) mod table;
 pub(crate) mod tree;
@@ -20,8 +23,9 @@ pub(crate) mod trie;
 
 use crate::desk::{SLOT_WORDS, SLOTS};
 use crate::shm::{Segment, Segments};
-use crate::{Epoch, Time, Version};
+use crate::{Epoch, Version};
 use protocol::Ring;
+pub(crate) use root::{ROOT_WORDS, Root};
 use std::sync::atomic::{AtomicU64, Ordering};
 use thiserror::Error;
 
@@ -75,7 +79,7 @@ pub enum ReadError {
 }
 
 pub(crate) const MAGIC: u64 = u64::from_le_bytes(*b"cortexG1");
-pub(crate) const FORMAT: u64 = 4;
+pub(crate) const FORMAT: u64 = 5;
 
 /// Header words of segment 0.
 mod at {
@@ -97,8 +101,6 @@ mod at {
 pub(crate) const LEASES: usize = 32;
 /// How many versions back a root can be looked up.
 const ROOT_RING: u64 = 4096;
-/// Words of a root.
-pub(crate) const ROOT_WORDS: usize = 18;
 /// First word that blocks are given out from.
 pub(crate) const FIRST_BLOCK: Address = (at::SESSIONS + sessions::COUNT) as u64;
 
@@ -108,135 +110,6 @@ pub(crate) struct LeaseMark {
     pub(crate) place: usize,
     /// Not 0, and never given twice.
     pub(crate) token: u64,
-}
-
-/// One version of the graph: where its structures begin.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Root {
-    pub(crate) version: u64,
-    pub(crate) time: i64,
-    /// Link to the trie from node id to node record.
-    pub(crate) nodes: trie::Link,
-    /// Tree from (hash of name, node id) to node record.
-    pub(crate) names: Address,
-    /// Directory by type: tree of node ids, count.
-    pub(crate) types: Address,
-    /// Directory by label: tree of (from, to), count.
-    pub(crate) labels: Address,
-    /// Blob: the schema, and how often it changed.
-    pub(crate) schema: Address,
-    pub(crate) schema_version: u64,
-    /// Blob: the names of the agents that have written.
-    pub(crate) writers: Address,
-    pub(crate) node_count: u64,
-    pub(crate) edge_count: u64,
-    pub(crate) next_id: u64,
-    /// Tree from (label, type of source, type of target) to how many edges are such.
-    pub(crate) triples: Address,
-    /// Directory by attribute with an index: tree of (value's place in the order, node id), count.
-    pub(crate) values: Address,
-    /// The agent that made the version: 1 more than its number among the writers, 0 for none.
-    pub(crate) agent: u64,
-    /// Blob: the rules that were applied; 0 for none.
-    pub(crate) rules: Address,
-    /// Tree from (client, 0) to the client's last transaction.
-    pub(crate) answers: Address,
-    /// The epoch of the first store of this graph.
-    pub(crate) lineage: u64,
-}
-
-impl Root {
-    fn to_words(self) -> [u64; ROOT_WORDS] {
-        let Self {
-            version,
-            time,
-            nodes,
-            names,
-            types,
-            labels,
-            schema,
-            schema_version,
-            writers,
-            node_count,
-            edge_count,
-            next_id,
-            triples,
-            values,
-            agent,
-            rules,
-            answers,
-            lineage,
-        } = self;
-        let time = time.cast_unsigned();
-        [
-            version,
-            time,
-            nodes,
-            names,
-            types,
-            labels,
-            schema,
-            schema_version,
-            writers,
-            node_count,
-            edge_count,
-            next_id,
-            triples,
-            values,
-            agent,
-            rules,
-            answers,
-            lineage,
-        ]
-    }
-
-    fn from_words(words: [u64; ROOT_WORDS]) -> Self {
-        let [
-            version,
-            time,
-            nodes,
-            names,
-            types,
-            labels,
-            schema,
-            schema_version,
-            writers,
-            node_count,
-            edge_count,
-            next_id,
-            triples,
-            values,
-            agent,
-            rules,
-            answers,
-            lineage,
-        ] = words;
-        let time = time.cast_signed();
-        Self {
-            version,
-            time,
-            nodes,
-            names,
-            types,
-            labels,
-            schema,
-            schema_version,
-            writers,
-            node_count,
-            edge_count,
-            next_id,
-            triples,
-            values,
-            agent,
-            rules,
-            answers,
-            lineage,
-        }
-    }
-
-    pub(crate) fn time(&self) -> Time {
-        Time::from_nanoseconds(self.time)
-    }
 }
 
 /// The arena as one process sees it.
@@ -451,44 +324,54 @@ impl Arena {
             .filter(|_| there)
     }
 
+    #[cold]
+    fn lease_holds(&self, mark: &LeaseMark) -> bool {
+        let word = self.header(at::LEASES + mark.place);
+        let holds = |word| protocol::stands(word, |token| token == mark.token);
+        mark.place < LEASES && word.is_some_and(holds)
+    }
+
     /// Whether all that was read of `version` up to now was genuine, where the reader may have a
     /// lease of it.
     #[inline]
-    pub(crate) fn check(&self, version: u64, lease: Option<LeaseMark>) -> Result<(), ReadError> {
-        let oldest = self.header(at::OLDEST);
-        if oldest.is_none_or(|word| protocol::stands(word, |oldest| version >= oldest)) {
-            return Ok(());
+    pub(crate) fn check(&self, version: u64, lease: Option<&LeaseMark>) -> Result<(), ReadError> {
+        match self.overtaken(version, lease) {
+            None => Ok(()),
+            Some(oldest) => Err(ReadError::SnapshotTooOld {
+                version: Version(version),
+                oldest: Version(oldest),
+            }),
         }
-        self.check_lease(version, lease)
-    }
-
-    #[cold]
-    fn check_lease(&self, version: u64, lease: Option<LeaseMark>) -> Result<(), ReadError> {
-        let holds = |mark: LeaseMark| {
-            let word = self.header(at::LEASES + mark.place);
-            mark.place < LEASES
-                && word.is_some_and(|word| protocol::stands(word, |token| token == mark.token))
-        };
-        if lease.is_some_and(holds) {
-            return Ok(());
-        }
-        Err(ReadError::SnapshotTooOld {
-            version: Version(version),
-            oldest: Version(self.oldest()),
-        })
     }
 
     /// The error of a read that met something impossible at `address`: either the memory was
     /// reused under the reader, or it is damaged.
-    #[cold]
+    #[inline]
     pub(crate) fn broken(
         &self,
         version: u64,
-        lease: Option<LeaseMark>,
+        lease: Option<&LeaseMark>,
         address: Address,
     ) -> ReadError {
-        self.check(version, lease)
-            .err()
-            .unwrap_or(ReadError::Damaged { address })
+        let checked = self.check(version, lease);
+        checked.err().unwrap_or(ReadError::Damaged { address })
+    }
+
+    /// The oldest version that can be read, where `version` is older and no lease keeps it.
+    ///
+    /// What is out of the way gives no more than registers hold: who is given a place to write to
+    /// keeps its own result there, too.
+    #[inline]
+    fn overtaken(&self, version: u64, lease: Option<&LeaseMark>) -> Option<u64> {
+        let word = self.header(at::OLDEST)?;
+        let mut oldest = 0;
+        let stands = protocol::stands(word, |found| {
+            oldest = found;
+            version >= found
+        });
+        if stands || lease.is_some_and(|mark| self.lease_holds(mark)) {
+            return None;
+        }
+        Some(oldest)
     }
 }

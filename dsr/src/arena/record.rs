@@ -1,7 +1,8 @@
 //! The blocks behind the tries and trees: nodes, edges, attributes, texts and directories. This
 //! file owns their layout, and guarantees that decoding takes any words without a panic.
 //!
-//! - Node: id, kind word, name (blob), version, out tree, in tree, then its table of attributes.
+//! - Node: id, kind word, name (blob), version, out tree, in tree, the version that wrote the record, then
+//!   its table of attributes.
 //!   Out tree: (label, target) to edge; in tree: (label, source) to 0.
 //! - Edge: from, to, kind word, version, then its table of attributes.
 //! - Kind word: `type or label | attributes << 16 | words of the table << 32`.
@@ -15,7 +16,9 @@ use super::tree::Key;
 use super::{Address, Arena, Word};
 use crate::graph::Writer;
 
-pub(crate) const NODE_HEADER: usize = 6;
+pub(crate) const NODE_HEADER: usize = 7;
+/// The word of a node's header that says since which version the record is the node's.
+pub(crate) const SINCE: usize = 6;
 pub(crate) const EDGE_HEADER: usize = 4;
 
 /// The key under which edges of a label between nodes of these exact types are counted.
@@ -46,7 +49,7 @@ impl NodeRecord {
     pub(crate) fn read(arena: &Arena, address: Address) -> Result<Self, Address> {
         let words = arena.from(address).ok_or(address)?;
         let (header, table) = words.split_first_chunk::<NODE_HEADER>().ok_or(address)?;
-        let [id, kind, name, version, out, into] = header.each_ref().map(Word::load);
+        let [id, kind, name, version, out, into, _] = header.each_ref().map(Word::load);
         Ok(Self {
             id,
             type_id: kind as u16,
@@ -58,10 +61,11 @@ impl NodeRecord {
         })
     }
 
-    /// Appends its words.
-    pub(crate) fn encode(&self, words: &mut Vec<u64>) {
+    /// Appends its words, as those of a record that is the node's from version `since` on.
+    pub(crate) fn encode(&self, since: u64, words: &mut Vec<u64>) {
         let kind = kind_word(self.type_id, &self.table);
-        words.extend([self.id, kind, self.name, self.version, self.out, self.into]);
+        words.extend([self.id, kind, self.name, self.version]);
+        words.extend([self.out, self.into, since]);
         words.extend(self.table.words());
     }
 

@@ -164,11 +164,10 @@ impl<'a> Range<'a> {
     }
 
     /// The next entry; `Err` where the tree leads to an impossible place.
-    #[inline]
     pub(crate) fn next(&mut self) -> Result<Option<Entry>, Address> {
         loop {
-            if let Some([a, b, word]) = self.leaf.next() {
-                return Ok(Some(([a.load(), b.load()], word.load())));
+            if let Some(entry) = self.next_in_leaf() {
+                return Ok(Some(entry));
             }
             if !self.next_leaf()? {
                 return Ok(None);
@@ -176,8 +175,17 @@ impl<'a> Range<'a> {
         }
     }
 
+    /// The next entry of the leaf at hand.
+    #[inline]
+    pub(crate) fn next_in_leaf(&mut self) -> Option<Entry> {
+        let [a, b, word] = self.leaf.next()? else {
+            return None;
+        };
+        Some(([a.load(), b.load()], word.load()))
+    }
+
     /// Goes on to the next leaf, if there is one.
-    fn next_leaf(&mut self) -> Result<bool, Address> {
+    pub(crate) fn next_leaf(&mut self) -> Result<bool, Address> {
         while let Some((block, child)) = self.path.pop() {
             if child < block.len() {
                 self.path.push((block, child + 1));

@@ -63,14 +63,8 @@ fn level_of(link: Link) -> u64 {
     link >> 60
 }
 
-/// The record of node `id` and the words from its first on; `Err` where the trie leads to an
-/// impossible place.
-#[inline]
-pub(crate) fn find(
-    arena: &Arena,
-    root: Link,
-    id: u64,
-) -> Result<Option<(Address, &[Word])>, Address> {
+/// The record of node `id`; `Err` where the trie leads to an impossible place.
+pub(crate) fn find(arena: &Arena, root: Link, id: u64) -> Result<Option<Address>, Address> {
     let mut link = root;
     for _ in 0..STEPS {
         if link == 0 {
@@ -80,7 +74,7 @@ pub(crate) fn find(
         let words = arena.from(address).ok_or(address)?;
         let first = words.first().ok_or(address)?.load();
         if is_record(link) {
-            return Ok((first == id).then_some((address, words)));
+            return Ok((first == id).then_some(address));
         }
         let level = level_of(link);
         if level >= LEVELS {

@@ -6,6 +6,7 @@ mod answers;
 mod apply;
 mod image;
 mod lease;
+mod writer;
 
 pub(crate) use answers::Answered;
 pub use answers::TransactionId;
@@ -14,9 +15,10 @@ pub(crate) use image::{EdgeImage, Frame, NodeImage};
 pub use image::{Image, decode_image};
 pub use lease::LeaseRefusal;
 use lease::Leased;
+pub(crate) use writer::Writer;
 
 use crate::arena::allocator::{Allocator, Full, Growth, HeapGrowth};
-use crate::arena::{Address, Arena, Root, record};
+use crate::arena::{Arena, Root, record};
 use crate::interchange::{Stamp, World};
 use crate::{
     Change, Commit, Epoch, Manifest, NodeId, Operation, Refusal, Rights, Schema, Snapshot, Time,
@@ -89,75 +91,6 @@ impl Default for Limits {
     }
 }
 
-/// Writes blocks into the arena.
-#[derive(Debug)]
-pub(crate) struct Writer {
-    arena: Arc<Arena>,
-    allocator: Allocator,
-    /// Where a block's words are put together; empty between uses.
-    scratch: Vec<u64>,
-}
-
-impl Writer {
-    pub(crate) fn arena(&self) -> &Arena {
-        &self.arena
-    }
-
-    /// Writes a new block.
-    pub(crate) fn write(&mut self, words: &[u64]) -> Result<Address, Full> {
-        let address = self.allocator.allocate(&self.arena, words.len())?;
-        self.fill(address, words);
-        Ok(address)
-    }
-
-    fn fill(&self, address: Address, words: &[u64]) {
-        let block = self.arena.block(address, words.len()).unwrap_or(&[]);
-        for (to, from) in block.iter().zip(words) {
-            to.store(*from);
-        }
-    }
-
-    /// Writes `words` in place of the block of `old` words at `address`: into it where nobody
-    /// else can see it yet and they fit, else into a new block.
-    pub(crate) fn replace(
-        &mut self,
-        address: Address,
-        old: usize,
-        words: &[u64],
-    ) -> Result<Address, Full> {
-        if self.allocator.is_fresh(address) && words.len() == old {
-            self.fill(address, words);
-            return Ok(address);
-        }
-        let new = self.write(words)?;
-        self.retire(address, old);
-        Ok(new)
-    }
-
-    /// Writes what `encode` appends, in place of the `old` block and its words where there is one.
-    pub(crate) fn put(
-        &mut self,
-        old: Option<(Address, usize)>,
-        encode: impl FnOnce(&mut Vec<u64>),
-    ) -> Result<Address, Full> {
-        let mut words = std::mem::take(&mut self.scratch);
-        words.clear();
-        encode(&mut words);
-        let put = match old {
-            Some((address, len)) => self.replace(address, len, &words),
-            None => self.write(&words),
-        };
-        self.scratch = words;
-        put
-    }
-
-    pub(crate) fn retire(&mut self, address: Address, words: usize) {
-        if address != 0 {
-            self.allocator.retire(address, words);
-        }
-    }
-}
-
 /// The graph and its single writer.
 ///
 /// ```
@@ -214,11 +147,7 @@ impl Graph {
         growth.reserve(0, 0, crate::arena::FIRST_BLOCK as usize)?;
         let allocator = Allocator::new(growth);
         let mut graph = Self {
-            writer: Writer {
-                arena,
-                allocator,
-                scratch: Vec::new(),
-            },
+            writer: Writer::new(arena, allocator),
             root: Root {
                 next_id: 1,
                 lineage: epoch.0,
@@ -267,7 +196,11 @@ impl Graph {
         self.snapshot_of(self.root)
     }
 
-    fn snapshot_of(&self, root: Root) -> Snapshot {
+    fn snapshot_of(&self, mut root: Root) -> Snapshot {
+        if root.version != self.root.version {
+            // The cells do not know of a version under way.
+            root.cell_count = 0;
+        }
         Snapshot::new(
             Arc::clone(&self.writer.arena),
             root,
@@ -427,15 +360,13 @@ impl Graph {
     }
 
     fn abandon(&mut self, before: &(Arc<Schema>, Arc<Vec<String>>)) {
-        self.writer.allocator.abandoned();
+        self.writer.abandon();
         self.schema = Arc::clone(&before.0);
         self.writers = Arc::clone(&before.1);
     }
 
     fn publish(&mut self, root: Root) {
-        self.writer.arena.publish(&root);
-        let allocator = &mut self.writer.allocator;
-        allocator.committed(self.root.version, root.version);
+        self.writer.publish(self.root.version, &root);
         self.root = root;
     }
 

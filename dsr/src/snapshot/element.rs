@@ -1,7 +1,8 @@
 //! The nodes, edges and attributes of a snapshot. As every read of a snapshot, theirs are genuine or
 //! say [`ReadError::SnapshotTooOld`].
 
-use super::{NodeIds, Scan, Snapshot};
+use super::scan::Scan;
+use super::{NodeIds, Snapshot};
 use crate::arena::record;
 use crate::arena::table::{self, AttributeRecord, Head, Place, Small};
 use crate::arena::{Address, ReadError, Word};
@@ -121,7 +122,10 @@ impl<'a> Element<'a> {
     pub fn attribute(&self, name: AttributeId) -> Result<Option<Attribute>, ReadError> {
         let words = match self.find(name) {
             Ok(Some(words)) => words,
-            Ok(None) => return self.snapshot.check().map(|()| None),
+            Ok(None) => {
+                self.snapshot.check()?;
+                return Ok(None);
+            }
             Err(address) => return Err(self.snapshot.broken(address)),
         };
         // Numbers and poses are made here, so that they are written once, where they are wanted.
@@ -135,7 +139,13 @@ impl<'a> Element<'a> {
                 let pose = table::pose_of(row);
                 Ok(Some(written(name, head, Value::Pose(pose))))
             }
-            _ => self.other_attribute(name, words),
+            _ => match self.other_attribute(name, words) {
+                Ok(record) => {
+                    self.snapshot.check()?;
+                    Ok(Some(written(name, record.head, record.value)))
+                }
+                Err(address) => Err(self.snapshot.broken(address)),
+            },
         }
     }
 
@@ -171,24 +181,25 @@ impl<'a> Element<'a> {
         &self,
         name: AttributeId,
         words: &[Word],
-    ) -> Result<Option<Attribute>, ReadError> {
-        let record = AttributeRecord::decode(words).ok_or(self.address);
-        let committed = self.snapshot.genuine(record)?;
-        Ok(Some(self.newest(name, committed)))
+    ) -> Result<AttributeRecord, Address> {
+        let committed = AttributeRecord::decode(words).ok_or(self.address)?;
+        Ok(self.newest(name, committed))
     }
 
     /// What its owner gives out of a hot attribute takes the place of what was committed before.
-    fn newest(&self, name: AttributeId, committed: AttributeRecord) -> Attribute {
-        let head = committed.head;
+    fn newest(&self, name: AttributeId, committed: AttributeRecord) -> AttributeRecord {
         let hot = self.snapshot.hot.as_ref().filter(|_| self.is_hot(name));
-        let session = || self.snapshot.arena.session_of(head.writer);
+        let session = || self.snapshot.arena.session_of(committed.head.writer);
         let found = hot.and_then(|hot| hot.read(session(), self.key_of(name)?));
         match found {
-            Some(hot) if hot.head.time > head.time => {
-                let time = hot.head.time;
-                written(name, Head { time, ..head }, hot.value)
-            }
-            _ => written(name, head, committed.value),
+            Some(hot) if hot.head.time > committed.head.time => AttributeRecord {
+                value: hot.value,
+                head: Head {
+                    time: hot.head.time,
+                    ..committed.head
+                },
+            },
+            _ => committed,
         }
     }
 
@@ -291,7 +302,8 @@ impl<'a> Element<'a> {
                 let row = row.load();
                 let record = self.snapshot.genuine(self.decode(table, row))?;
                 let name = AttributeId(table::name_of(row));
-                Ok(self.newest(name, record))
+                let newest = self.newest(name, record);
+                Ok(written(name, newest.head, newest.value))
             })
             .collect()
     }
@@ -403,18 +415,12 @@ impl<'a> Node<'a> {
 
     /// Where the edges of a label that start here end, by ascending id.
     pub fn targets_of(&self, label: LabelId) -> NodeIds<'a> {
-        NodeIds {
-            scan: self.adjacent(4, [label.0; 2]),
-            word: 1,
-        }
+        NodeIds::new(self.adjacent(4, [label.0; 2]), 1)
     }
 
     /// Where the edges of a label that end here start, by ascending id.
     pub fn sources_of(&self, label: LabelId) -> NodeIds<'a> {
-        NodeIds {
-            scan: self.adjacent(5, [label.0; 2]),
-            word: 1,
-        }
+        NodeIds::new(self.adjacent(5, [label.0; 2]), 1)
     }
 
     /// The edges that end here, by label and source.

@@ -5,7 +5,8 @@
 //! So ask [`Snapshot::check`] when the algorithm is done: if it says yes, everything that the
 //! algorithm saw was genuine; if not, throw the outcome away. No walk goes on for ever.
 
-use super::{Edge, Node, Scan, Snapshot};
+use super::scan::Scan;
+use super::{Edge, Node, Snapshot};
 use crate::{EdgeKey, LabelId, NodeId, TypeId};
 use petgraph::visit::{
     Data, EdgeCount, EdgeRef, GraphBase, GraphProp, IntoEdgeReferences, IntoEdges,

@@ -4,7 +4,7 @@
 use super::{Work, damaged, read, touch};
 use crate::arena::record::{self, NodeRecord};
 use crate::arena::table::Table;
-use crate::arena::{Address, tree, trie};
+use crate::arena::{Address, cells, tree, trie};
 use crate::rights::Carrier;
 use crate::value::hash;
 use crate::{AttributeId, NodeId, NodeRef, Refusal, SchemaError, Touch, TypeId, Value};
@@ -32,7 +32,7 @@ impl Work<'_> {
                 .ok_or_else(|| Refusal::NotFound(node.to_string()))?,
         };
         let arena = &self.graph.writer.arena;
-        let (address, _) = read(trie::find(arena, self.root.nodes, id.0))?
+        let address = read(trie::find(arena, self.root.nodes, id.0))?
             .ok_or_else(|| Refusal::NotFound(node.to_string()))?;
         Ok((address, read(NodeRecord::read(arena, address))?))
     }
@@ -42,9 +42,14 @@ impl Work<'_> {
         old: Option<(Address, usize)>,
         node: &NodeRecord,
     ) -> Result<(), Refusal> {
-        let writer = &mut self.graph.writer;
-        let put = writer.put(old, |words| node.encode(words));
-        let put = put.and_then(|at| trie::insert(writer, self.root.nodes, node.id, at));
+        let (since, writer) = (self.root.version, &mut self.graph.writer);
+        let put = writer.put(old, |words| node.encode(since, words));
+        let put = put.and_then(|at| {
+            if old.is_none_or(|(address, _)| address != at) {
+                writer.moved.push((node.id, at));
+            }
+            trie::insert(writer, self.root.nodes, node.id, at)
+        });
         self.root.nodes = self.room(put)?;
         Ok(())
     }
@@ -91,6 +96,7 @@ impl Work<'_> {
         }
         let blob = record::write_blob(&mut self.graph.writer, name.as_bytes());
         node.name = self.room(blob)?;
+        cells::reach(&mut self.graph.writer, &mut self.root, id.0);
         self.put_node(None, &node)?;
         let names = tree::insert(
             &mut self.graph.writer,
@@ -165,6 +171,7 @@ impl Work<'_> {
         let words = record::blob_len(writer.arena(), node.name);
         writer.retire(node.name, words);
         writer.retire(address, node.len());
+        writer.moved.push((id.0, 0));
         let nodes = trie::remove(writer, self.root.nodes, id.0);
         let names = tree::remove(writer, self.root.names, [hash, id.0]);
         self.root.nodes = self.room(nodes)?;
