@@ -51,7 +51,8 @@ fn service(node: &IpcNode) -> Result<Factory, InstanceError> {
         .max_nodes(MAX_PROCESSES)
         .history_size(CAPACITY)
         .subscriber_max_buffer_size(CAPACITY)
-        .subscriber_max_borrowed_samples(2 * CAPACITY)
+        // Of each store.
+        .subscriber_max_borrowed_samples(CAPACITY)
         .enable_safe_overflow(true);
     one_at_a_time(node, || builder.clone().open_or_create())
         .map_err(|e| ipc("the arena's service", e))

@@ -352,6 +352,13 @@ impl Instance {
         config.global.node.cleanup_dead_nodes_on_creation = false;
         config.global.node.cleanup_dead_nodes_on_destruction = false;
         config.global.service.cleanup_dead_nodes_on_open = false;
+        // Of so many ports that died is kept what they sent until it was taken. Each takes some 4 KiB of
+        // every other, whether it is needed or not.
+        let defaults = &mut config.defaults;
+        defaults.request_response.client_expired_connection_buffer = 2 * MAX_STORES;
+        defaults
+            .publish_subscribe
+            .subscriber_expired_connection_buffer = 2 * MAX_STORES;
         Ok(config)
     }
 
