@@ -272,7 +272,10 @@ fn a_full_shared_memory_is_a_refusal_and_not_the_end() {
     let told = String::from_utf8_lossy(&filled.stderr);
     assert!(filled.status.success(), "{}: {told}", filled.status);
     let told = String::from_utf8(filled.stdout).unwrap();
-    assert_eq!(told, "full by the graph\nfull by others\nroom again\n");
+    assert_eq!(
+        told,
+        "full by the graph\nfull by others\nnobody joins\nroom again\n"
+    );
 }
 
 #[test]

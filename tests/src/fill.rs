@@ -2,7 +2,7 @@
 //! so, each time, and go on.
 
 use super::{Outcome, PATIENCE};
-use dsr::{Instance, Schema, Session, Store, Time, Transaction, Value};
+use dsr::{Instance, InstanceError, Schema, Session, Store, Time, Transaction, Value};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -38,6 +38,7 @@ fn large(name: &str) -> Transaction {
 
 fn fill_up(instance: &Instance) -> Outcome {
     let mut session = Session::attach(instance, "filler", PATIENCE)?;
+    let sender = session.publisher::<Vec<u8>>("large")?;
     let mut count = 0;
     loop {
         match session.commit(&large(&format!("n{count}")), Time::default()) {
@@ -68,6 +69,17 @@ fn fill_up(instance: &Instance) -> Outcome {
         session.snapshot()?.node_count();
     }
     println!("full by others");
+    for attempt in [
+        Session::join(instance, "late").map(|_| ()),
+        session.subscriber::<u64>("late").map(|_| ()),
+        sender.send(&vec![1; 1 << 20]),
+    ] {
+        match attempt {
+            Err(InstanceError::Full { .. }) => {}
+            other => return Err(format!("{other:?}").into()),
+        }
+    }
+    println!("nobody joins");
     drop(file);
     std::fs::remove_file(other)?;
     let mut transaction = Transaction::new();

@@ -3,6 +3,7 @@
 
 mod cells;
 mod cut;
+mod full;
 mod indices;
 mod retype;
 
@@ -306,11 +307,8 @@ fn memory_stays_bounded_however_often_an_attribute_is_written() {
             .commit(&setting("x", i), "a", Time::default())
             .unwrap();
     }
-    assert!(
-        graph.bytes_in_use() < 200_000,
-        "{} bytes",
-        graph.bytes_in_use()
-    );
+    let bytes = graph.bytes_in_use();
+    assert!(bytes < 200_000, "{bytes} bytes");
     let snapshot = graph.snapshot();
     let node = snapshot.find_node_by_name("n").unwrap().unwrap();
     assert_eq!(node.value("x").unwrap(), Some(Value::I64(19_999)));

@@ -2,7 +2,9 @@
 //! commands, grids. This file guarantees that a slow or dead receiver holds nobody up: where its
 //! buffer is full the oldest message gives way.
 
-use super::{InstanceError, Ipc, IpcNode, MAX_PROCESSES, ipc, one_at_a_time, service_name};
+use super::{
+    InstanceError, Ipc, IpcNode, MAX_PROCESSES, ROOM, ipc, one_at_a_time, room_for, service_name,
+};
 use iceoryx2::port::publisher::Publisher as IpcPublisher;
 use iceoryx2::port::subscriber::Subscriber as IpcSubscriber;
 use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
@@ -18,7 +20,11 @@ pub(crate) const BUFFER: usize = 256;
 /// every receiver, and what they have taken out. Each receiver pays some 4 KiB for each of them.
 const UNDER_WAY: usize = BUFFER + 2 * MAX_PROCESSES + 16;
 
+/// Bytes of a message that has its place from the beginning; a larger one takes new memory.
+const SMALL: usize = 4096;
+
 fn service(node: &IpcNode, name: &str) -> Result<PortFactory<Ipc, [u8], ()>, InstanceError> {
+    room_for(ROOM)?;
     let builder = node
         .service_builder(&service_name(name)?)
         .publish_subscribe::<[u8]>()
@@ -46,7 +52,7 @@ impl<T: Serialize> Publisher<T> {
         let service = service(node, name)?;
         let port = service
             .publisher_builder()
-            .initial_max_slice_len(4096)
+            .initial_max_slice_len(SMALL)
             .allocation_strategy(AllocationStrategy::PowerOfTwo)
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .override_sample_preallocation(|worst| worst.min(UNDER_WAY))
@@ -70,6 +76,9 @@ impl<T: Serialize> Publisher<T> {
     /// [`InstanceError::Ipc`] where shared memory is exhausted.
     pub fn send(&self, message: &T) -> Result<(), InstanceError> {
         let bytes = postcard::to_stdvec(message).map_err(|e| ipc("encoding a message", e))?;
+        if bytes.len() > SMALL {
+            room_for(ROOM + bytes.len() as u64)?;
+        }
         let loan = self.port.loan_slice_uninit(bytes.len().max(1));
         let sample = loan.map_err(|e| ipc("sending a message", e))?;
         let padded = if bytes.is_empty() { &[0][..] } else { &bytes };

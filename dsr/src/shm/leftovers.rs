@@ -1,5 +1,5 @@
-//! What processes that were killed left in an instance, and the threads of a store that remove it. This
-//! file guarantees that nobody waits long for what a dead process was about to make, that its places
+//! What a store does for its instance beside its work: it removes what processes that were killed left,
+//! and makes sure of the memory of those that live. This file guarantees that nobody waits long for what a dead process was about to make, that its places
 //! in the services are free again, and that nothing is taken from a process that lives.
 //!
 //! iceoryx2 cleans up after a process that has ended, but not where it was killed at a bad moment:
@@ -9,12 +9,13 @@
 //! - A node without its lock, or a connection that nobody has entered yet: it is never looked at.
 
 use super::gate::Gate;
-use super::{InstanceError, Ipc, IpcNode, ipc, memory_of};
+use super::{InstanceError, Ipc, IpcNode, ROOM, ipc, memory_of, room_for};
 use iceoryx2::config::Config;
 use iceoryx2::node::{DeadNodeView, NodeView};
 use iceoryx2::prelude::{CallbackProgression, NodeState};
+use rustix::fs::{FallocateFlags, fallocate};
 use std::collections::BTreeSet;
-use std::fs::{self, Metadata};
+use std::fs::{self, File, Metadata};
 use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
@@ -28,6 +29,8 @@ const CLEANING: Duration = Duration::from_millis(500);
 const SWEEPING: Duration = Duration::from_millis(100);
 /// A connection that is half made for so long is not being made: its maker is stopped.
 const STOPPED: Duration = Duration::from_secs(1);
+/// Memory up to this many bytes is backed by pages whether it is in use or not.
+const RESERVED: u64 = 4 << 20;
 /// The mode of shared memory, and of a node's lock, while it is being made.
 const BEING_MADE: u32 = 0o200;
 /// The mode of a tag while it is being made.
@@ -117,6 +120,27 @@ pub(super) fn remove_half_made(config: &Config, passes: impl Fn(&str) -> bool) {
         let left = processes_in(name).any(|process| members.has_ended(process));
         if left || (name.ends_with(".connection") && age > Some(STOPPED)) {
             remove(&path);
+        }
+    }
+}
+
+/// Has the kernel make the pages of what members send each other small messages in: a page that is
+/// first touched when there is no room for it ends the process that does.
+fn reserve(config: &Config) {
+    for path in memory_of(&config.global.prefix.to_string()).unwrap_or_default() {
+        let Ok(file) = fs::metadata(&path) else {
+            continue;
+        };
+        let lacks = file.blocks() * 512 < file.len();
+        let small = (1..=RESERVED).contains(&file.len());
+        if !lacks || !small || is_half_made(&file) || room_for(ROOM + file.len()).is_err() {
+            continue;
+        }
+        let reserved = File::options().write(true).open(&path).and_then(|open| {
+            fallocate(open, FallocateFlags::KEEP_SIZE, 0, file.len()).map_err(io::Error::from)
+        });
+        if let Err(error) = reserved {
+            tracing::debug!("{}: {error}", path.display());
         }
     }
 }
@@ -218,7 +242,10 @@ impl Cleaner {
         let config = node.config().clone();
         let sweeping = Repeated::start("sweeping", SWEEPING, {
             let config = config.clone();
-            move || remove_half_made(&config, |_| true)
+            move || {
+                remove_half_made(&config, |_| true);
+                reserve(&config);
+            }
         })?;
         let clean = move || match clean(&config, || Gate::of(&config)) {
             Ok((0, 0)) => {}

@@ -56,6 +56,9 @@ pub(crate) type IpcNode = iceoryx2::node::Node<Ipc>;
 pub(crate) const MAX_PROCESSES: usize = 64;
 /// How many lives of the store may leave their ports behind before somebody cleans up.
 pub(crate) const MAX_STORES: usize = 8;
+/// The free shared memory, in bytes, that whoever joins or opens a channel leaves alone: until a store
+/// has made sure of what that takes, and for those who are there.
+const ROOM: u64 = 4 << 20;
 /// Bytes in the path of a socket, by unix(7), less the end.
 const SOCKET_PATH: usize = 107;
 /// Digits of a port's number.
@@ -93,6 +96,18 @@ pub enum InstanceError {
         name: String,
         /// How long it may be.
         room: usize,
+    },
+    /// Shared memory is full: what was asked for takes more than there is.
+    #[error(
+        "{free} KiB are free in /dev/shm, and this takes {needed}; free some, or mount it larger",
+        free = free >> 10,
+        needed = needed >> 10
+    )]
+    Full {
+        /// What it takes, in bytes.
+        needed: u64,
+        /// What there is, in bytes.
+        free: u64,
     },
     /// The operating system said no.
     #[error("cannot use {path}: {source}")]
@@ -369,6 +384,7 @@ impl Instance {
 
     fn join_as<S: Service>(&self) -> Result<iceoryx2::node::Node<S>, InstanceError> {
         set_log_level(LogLevel::Fatal);
+        room_for(ROOM)?;
         let gate = Gate::enter(self)?;
         if gate.is_none() {
             tracing::warn!("another process has been joining for seconds; is it stopped?");
@@ -412,6 +428,16 @@ pub(crate) fn wait(
 /// How much shared memory the host has left, in bytes.
 pub(crate) fn free_bytes() -> u64 {
     rustix::fs::statvfs(SHARED_MEMORY).map_or(0, |s| s.f_bavail * s.f_frsize)
+}
+
+/// Whether so many bytes of shared memory are free: memory that is written to when there is none
+/// ends the process.
+fn room_for(needed: u64) -> Result<(), InstanceError> {
+    let free = free_bytes();
+    if free < needed {
+        return Err(InstanceError::Full { needed, free });
+    }
+    Ok(())
 }
 
 #[allow(
