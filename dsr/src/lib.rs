@@ -50,7 +50,7 @@ pub use shm::{
 };
 pub use snapshot::{
     Attribute, Edge, Edges, Element, Neighbors, Node, NodeIds, Snapshot, TransformError,
-    TripleCount, ValueRange,
+    TripleCount, TypedIds, ValueRange,
 };
 pub use state::{State, StateError};
 pub use time::Time;

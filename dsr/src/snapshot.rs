@@ -11,7 +11,7 @@ mod scan;
 pub use element::{Attribute, Edge, Element, Node};
 pub use geometry::TransformError;
 pub use petgraph::{Edges, Neighbors};
-pub use scan::NodeIds;
+pub use scan::{NodeIds, TypedIds};
 
 use crate::arena::record;
 use crate::arena::tree::{self, Key};
@@ -382,15 +382,26 @@ impl Snapshot {
         &self,
         label: LabelId,
     ) -> impl Iterator<Item = Result<EdgeKey, ReadError>> {
+        self.typed_edges_of_label(label).map(|edge| Ok(edge?.0))
+    }
+
+    /// The edges of a label, by ascending source and target, with the exact types of both: reads no
+    /// node.
+    pub fn typed_edges_of_label(
+        &self,
+        label: LabelId,
+    ) -> impl Iterator<Item = Result<(EdgeKey, [TypeId; 2]), ReadError>> {
         let entry = record::directory_entry(&self.arena, self.root.labels, label.0);
         let root = self.genuine(entry).map(|(tree, _)| tree);
         self.scan(root, [0, 0], [u64::MAX, u64::MAX])
             .map(move |entry| {
-                entry.map(|([from, to], _)| EdgeKey {
+                let ([from, to], ends) = entry?;
+                let key = EdgeKey {
                     from: NodeId(from),
                     label,
                     to: NodeId(to),
-                })
+                };
+                Ok((key, record::types_of(ends).map(TypeId)))
             })
     }
 
@@ -417,7 +428,7 @@ impl Snapshot {
             root,
             [u64::from(key.label.0), key.to.0],
         ))?;
-        Ok(found.map(|address| Edge::at(self, address, key)))
+        Ok(found.map(|end| Edge::at(self, record::edge_of(end), key)))
     }
 
     /// The name of an agent that wrote an attribute.

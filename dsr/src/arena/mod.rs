@@ -79,7 +79,7 @@ pub enum ReadError {
 }
 
 pub(crate) const MAGIC: u64 = u64::from_le_bytes(*b"cortexG1");
-pub(crate) const FORMAT: u64 = 5;
+pub(crate) const FORMAT: u64 = 6;
 
 /// Header words of segment 0.
 mod at {

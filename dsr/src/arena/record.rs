@@ -3,7 +3,9 @@
 //!
 //! - Node: id, kind word, name (blob), version, out tree, in tree, the version that wrote the record, then
 //!   its table of attributes.
-//!   Out tree: (label, target) to edge; in tree: (label, source) to 0.
+//!   Out tree: (label, target) to end; in tree: (label, source) to end.
+//! - End: `edge | type of the node at the other end << 48`; in an in tree without the edge. So who
+//!   looks for neighbours of a type looks up none of another.
 //! - Edge: from, to, kind word, version, then its table of attributes.
 //! - Kind word: `type or label | attributes << 16 | words of the table << 32`.
 //! - Table and attribute: see the file `table`.
@@ -27,6 +29,37 @@ pub(crate) fn triple(label: u16, from: u16, to: u16) -> Key {
         u64::from(label) << 32 | u64::from(from) << 16 | u64::from(to),
         0,
     ]
+}
+
+const EDGE_OF_END: u64 = (1 << 48) - 1;
+
+/// What a node keeps of an edge: the type of the node at the other end, and the edge's record
+/// where it starts here, else 0.
+pub(crate) fn end(other: u16, edge: Address) -> u64 {
+    u64::from(other) << 48 | edge
+}
+
+/// The edge's record.
+#[inline]
+pub(crate) fn edge_of(end: u64) -> Address {
+    end & EDGE_OF_END
+}
+
+/// The type of the node at the other end.
+#[inline]
+pub(crate) fn other_type(end: u64) -> u16 {
+    (end >> 48) as u16
+}
+
+/// What a label's tree keeps of an edge: the types of its source and target.
+pub(crate) fn ends(types: [u16; 2]) -> u64 {
+    u64::from(types[0]) << 16 | u64::from(types[1])
+}
+
+/// The types of source and target.
+#[inline]
+pub(crate) fn types_of(ends: u64) -> [u16; 2] {
+    [(ends >> 16) as u16, ends as u16]
 }
 
 /// A node's record.

@@ -13,7 +13,7 @@ use std::ops::Deref;
 /// What nodes and edges have in common: a record with a version and a table of attributes.
 #[derive(Debug, Clone, Copy)]
 pub struct Element<'a> {
-    snapshot: &'a Snapshot,
+    pub(super) snapshot: &'a Snapshot,
     address: Address,
     /// Of its record.
     words: &'a [Word],
@@ -403,13 +403,14 @@ impl<'a> Node<'a> {
     ) -> impl Iterator<Item = Result<Edge<'a>, ReadError>> + use<'a> {
         let node = *self;
         node.adjacent(4, labels).map(move |entry| {
-            let ([label, to], address) = entry?;
+            let ([label, to], end) = entry?;
             let key = EdgeKey {
                 from: node.id,
                 label: LabelId(label as u16),
                 to: NodeId(to),
             };
-            Ok(Edge::at(node.element.snapshot, address, key))
+            let edge = record::edge_of(end);
+            Ok(Edge::at(node.element.snapshot, edge, key))
         })
     }
 

@@ -7,6 +7,7 @@
 
 use super::scan::Scan;
 use super::{Edge, Node, Snapshot};
+use crate::arena::record;
 use crate::{EdgeKey, LabelId, NodeId, TypeId};
 use petgraph::visit::{
     Data, EdgeCount, EdgeRef, GraphBase, GraphProp, IntoEdgeReferences, IntoEdges,
@@ -140,7 +141,7 @@ impl<'a> Iterator for Edges<'a> {
     type Item = Edge<'a>;
 
     fn next(&mut self) -> Option<Edge<'a>> {
-        let ([label, other], address) = self.scan.as_mut()?.next()?.ok()?;
+        let ([label, other], end) = self.scan.as_mut()?.next()?.ok()?;
         let (label, other) = (LabelId(label as u16), NodeId(other));
         if self.direction == Direction::Incoming {
             let (from, to) = (other, self.node);
@@ -149,7 +150,7 @@ impl<'a> Iterator for Edges<'a> {
         }
         let (from, to) = (self.node, other);
         let key = EdgeKey { from, label, to };
-        Some(Edge::at(self.snapshot, address, key))
+        Some(Edge::at(self.snapshot, record::edge_of(end), key))
     }
 }
 

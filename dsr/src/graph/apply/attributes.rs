@@ -77,10 +77,10 @@ impl Work<'_> {
         if before == after || !self.schema().has_index(attribute) {
             return Ok(());
         }
-        for (place, member) in [(before, false), (after, true)] {
+        for (place, word) in [(before, None), (after, Some(0))] {
             if let Some(place) = place {
                 let directory = self.root.values;
-                self.root.values = self.index(directory, attribute.0, [place, id.0], member)?;
+                self.root.values = self.index(directory, attribute.0, [place, id.0], word)?;
             }
         }
         Ok(())
@@ -170,12 +170,12 @@ impl Work<'_> {
                 );
             }
             Owner::Edge(edge) => {
-                let (key, address, mut record) = self.edge(edge)?;
+                let (key, end, mut record) = self.edge(edge)?;
                 let len = record.len();
                 let carrier = Carrier::Edge(key.label);
                 let name = self.change_row(carrier, &mut record.table, name, value)?;
                 record.version = self.stamp.record;
-                self.put_edge(key, Some((address, len)), &record)?;
+                self.put_edge(key, (end, len), &record)?;
                 touch(&mut self.edges, key, (), Touch::Updated, Some(name));
             }
         }

@@ -114,24 +114,25 @@ impl Work<'_> {
     /// Adds the node to, or takes it from, the members of its type.
     fn index_type(&mut self, type_id: TypeId, id: NodeId, member: bool) -> Result<(), Refusal> {
         let directory = self.root.types;
-        self.root.types = self.index(directory, type_id.0, [id.0, 0], member)?;
+        let word = member.then_some(0);
+        self.root.types = self.index(directory, type_id.0, [id.0, 0], word)?;
         Ok(())
     }
 
+    /// Adds `key` with a word to the tree that a directory keeps for `id`, or takes it out.
     pub(super) fn index(
         &mut self,
         directory: Address,
         id: u16,
         key: tree::Key,
-        member: bool,
+        word: Option<u64>,
     ) -> Result<Address, Refusal> {
         let entry = record::directory_entry(&self.graph.writer.arena, directory, id);
         let (members, count) = read(entry)?;
         let writer = &mut self.graph.writer;
-        let entry = if member {
-            tree::insert(writer, members, key, 0).map(|root| (root, count + 1))
-        } else {
-            tree::remove(writer, members, key).map(|root| (root, count.saturating_sub(1)))
+        let entry = match word {
+            Some(word) => tree::insert(writer, members, key, word).map(|root| (root, count + 1)),
+            None => tree::remove(writer, members, key).map(|root| (root, count.saturating_sub(1))),
         };
         let directory =
             entry.and_then(|entry| record::set_directory_entry(writer, directory, id, entry));
@@ -190,7 +191,7 @@ impl Work<'_> {
 
     pub(super) fn retype_node(&mut self, node: &NodeRef, type_name: &str) -> Result<(), Refusal> {
         let type_id = self.type_id(type_name)?;
-        let (address, mut node) = self.node(node)?;
+        let (_, node) = self.node(node)?;
         let id = NodeId(node.id);
         if type_id.0 == node.type_id {
             return Ok(());
@@ -200,7 +201,9 @@ impl Work<'_> {
         }
         self.index_type(TypeId(node.type_id), id, false)?;
         self.index_type(type_id, id, true)?;
-        self.recount_triples(id, TypeId(node.type_id), type_id)?;
+        self.retype_edges(id, node.type_id, type_id.0)?;
+        // An edge from the node to itself has changed its record.
+        let (address, mut node) = self.node(&id.into())?;
         let len = node.len();
         node.type_id = type_id.0;
         node.version = self.stamp.record;
@@ -209,8 +212,9 @@ impl Work<'_> {
         Ok(())
     }
 
-    /// Moves what is counted of the node's edges from one type to another.
-    fn recount_triples(&mut self, id: NodeId, old: TypeId, new: TypeId) -> Result<(), Refusal> {
+    /// Says of the node's edges at their other ends, in the index of their labels and in the counts
+    /// that it is of another type.
+    fn retype_edges(&mut self, id: NodeId, old: u16, new: u16) -> Result<(), Refusal> {
         let edges = {
             let snapshot = self.snapshot();
             let node = snapshot.find_node(id).map_err(damaged)?;
@@ -229,13 +233,14 @@ impl Work<'_> {
             } else {
                 Some(self.node(&other.into())?.1.type_id)
             };
-            let ends = |this: TypeId| match other {
-                None => [this.0, this.0],
-                Some(other) if key.from == id => [this.0, other],
-                Some(other) => [other, this.0],
+            let ends = |this: u16| match other {
+                None => [this, this],
+                Some(other) if key.from == id => [this, other],
+                Some(other) => [other, this],
             };
             self.count_triple(key.label, ends(old), false)?;
             self.count_triple(key.label, ends(new), true)?;
+            self.retype_ends(key, ends(new))?;
         }
         Ok(())
     }

@@ -42,8 +42,31 @@ pub(super) fn indices(snapshot: &Snapshot) -> Result<(Valued, Triples), ReadErro
             let triple = triple?;
             triples.insert((label, triple.from, triple.to), triple.count);
         }
+        types_at_ends(snapshot, label)?;
     }
     Ok((values, triples))
+}
+
+/// Looks whether the types that are kept beside a label's edges are those of the nodes.
+#[allow(clippy::panic_in_result_fn, reason = "a wrong answer fails the test")]
+fn types_at_ends(snapshot: &Snapshot, label: LabelId) -> Result<(), ReadError> {
+    let find = |id| {
+        let node = snapshot.find_node(id)?;
+        node.ok_or(ReadError::Damaged { address: 0 })
+    };
+    for edge in snapshot.typed_edges_of_label(label) {
+        let (key, types) = edge?;
+        let (from, to) = (find(key.from)?, find(key.to)?);
+        assert_eq!(types, [from.type_id(), to.type_id()]);
+        assert!(from.has_target(label, key.to)? && to.has_source(label, key.from)?);
+        let targets = from
+            .typed_targets_of(label)
+            .collect::<Result<Vec<_>, _>>()?;
+        assert!(targets.contains(&(key.to, to.type_id())));
+        let sources = to.typed_sources_of(label).collect::<Result<Vec<_>, _>>()?;
+        assert!(sources.contains(&(key.from, from.type_id())));
+    }
+    Ok(())
 }
 
 /// The same, counted.
