@@ -231,6 +231,9 @@ pub(crate) enum RulesAction {
         /// JSON or AGM model XML
         #[arg(long, value_name = "W")]
         world: Option<PathBuf>,
+        /// Also what an agent's rules do that its manifest (TOML) does not give; may be repeated
+        #[arg(long, value_name = "M")]
+        manifest: Vec<PathBuf>,
         /// Also which rules can disable each other, with the smallest graphs where they do
         #[arg(long)]
         conflicts: bool,

@@ -248,6 +248,20 @@ pub enum Problem {
         /// The smallest graph where both are applicable, in words.
         graph: String,
     },
+    /// A rule of an agent that may not apply it.
+    #[error("the manifest of `{agent}` gives no right to apply this rule")]
+    NotGiven {
+        /// The agent.
+        agent: String,
+    },
+    /// An effect that the agent may have by no other right than the rule.
+    #[error("{what}, which the manifest of `{agent}` gives only by this rule")]
+    BeyondManifest {
+        /// What it does.
+        what: String,
+        /// The agent.
+        agent: String,
+    },
     /// An included file that could not be read.
     #[error("cannot read the included file `{path}`: {reason}")]
     Include {
@@ -267,6 +281,7 @@ impl Problem {
             | Self::NotUnfolded { .. }
             | Self::NeverMatches { .. }
             | Self::UnusedVariable { .. }
+            | Self::BeyondManifest { .. }
             | Self::Unreachable { .. } => Severity::Warning,
             Self::Conflict { .. } => Severity::Note,
             _ => Severity::Error,
@@ -285,6 +300,9 @@ impl Problem {
                 .map(|name| format!("did you mean `{name}`?")),
             Self::UndeclaredParent { suggestion, .. } => {
                 Some(format!("did you mean `{suggestion}`?"))
+            }
+            Self::NotGiven { .. } => {
+                Some("name it, or `agent(NAME)`, under `rules` in the manifest".to_owned())
             }
             Self::Stray(_) => Some("remove it, or look for a missing opening bracket".to_owned()),
             Self::Deleted { .. } => {

@@ -5,6 +5,7 @@ use super::{ANY, AttributeRight, Manifest, RuleRight};
 use crate::{Schema, suggest};
 use miette::{Diagnostic, NamedSource, SourceSpan};
 use serde::Deserialize;
+use std::ops::Range;
 use thiserror::Error;
 use toml::Spanned;
 
@@ -65,7 +66,7 @@ impl Reader<'_> {
         self.schema.attributes().iter().map(|a| a.name.as_str())
     }
 
-    fn note(&mut self, message: String, span: std::ops::Range<usize>, help: Option<String>) {
+    fn note(&mut self, message: String, span: Range<usize>, help: Option<String>) {
         self.defects.push(Defect {
             message,
             span: Some(span.into()),
@@ -74,7 +75,7 @@ impl Reader<'_> {
     }
 
     /// Notes `name` where it is none of the known; a schema that is open knows every name.
-    fn check(&mut self, what: &str, name: &str, span: std::ops::Range<usize>, known: &[String]) {
+    fn check(&mut self, what: &str, name: &str, span: Range<usize>, known: &[String]) {
         if name == ANY || self.schema.is_open() || known.iter().any(|k| k == name) {
             return;
         }
@@ -112,14 +113,14 @@ impl Reader<'_> {
     }
 }
 
-fn rule(text: &str) -> RuleRight {
+fn rule(text: &str, place: Range<usize>) -> RuleRight {
     let actor = text
         .strip_prefix("agent(")
         .and_then(|t| t.strip_suffix(')'));
     match actor {
         _ if text == ANY => RuleRight::Every,
         Some(actor) => RuleRight::Of(actor.trim().to_owned()),
-        None => RuleRight::Named(text.to_owned()),
+        None => RuleRight::Named(text.to_owned(), place),
     }
 }
 
@@ -154,6 +155,10 @@ impl Manifest {
         }
         let types: Vec<String> = reader.types().map(str::to_owned).collect();
         let labels: Vec<String> = reader.labels().map(str::to_owned).collect();
+        let rules = file.rules.iter();
+        let rules = rules
+            .map(|text| rule(text.get_ref(), text.span()))
+            .collect();
         let manifest = Self {
             agent: file.agent.get_ref().clone(),
             nodes: reader.names("node type", &file.nodes, &types),
@@ -163,7 +168,7 @@ impl Manifest {
                 .iter()
                 .filter_map(|text| reader.attribute(text))
                 .collect(),
-            rules: file.rules.iter().map(|text| rule(text.get_ref())).collect(),
+            rules,
             several: file.several,
         };
         if reader.defects.is_empty() {
@@ -236,8 +241,8 @@ mod tests {
 
     #[test]
     fn rules_are_given_by_name_by_agent_or_all() {
-        assert_eq!(rule("*"), RuleRight::Every);
-        assert_eq!(rule("agent(driver)"), RuleRight::Of("driver".into()));
-        assert_eq!(rule("goTo"), RuleRight::Named("goTo".into()));
+        assert_eq!(rule("*", 0..3), RuleRight::Every);
+        assert_eq!(rule("agent(driver)", 0..15), RuleRight::Of("driver".into()));
+        assert_eq!(rule("goTo", 2..8), RuleRight::Named("goTo".into(), 2..8));
     }
 }

@@ -8,6 +8,7 @@ pub use file::ManifestError;
 use crate::{AttributeId, LabelId, Refusal, Schema, TypeId};
 use rustc_hash::FxHashSet;
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Stands for every name.
@@ -29,8 +30,8 @@ enum RuleRight {
     Every,
     /// `agent(NAME)`: the rules that the grammar gives to that agent.
     Of(String),
-    /// The rule of that name.
-    Named(String),
+    /// The rule of that name, and where in the manifest it stands.
+    Named(String, Range<usize>),
 }
 
 /// What one agent may write to the graph; everybody may read all of it.
@@ -72,6 +73,45 @@ impl Manifest {
     /// Whether several processes may go by the agent's name at once.
     pub fn several(&self) -> bool {
         self.several
+    }
+
+    /// Whether it gives the right to create, delete and retype nodes of a type, of which `is_a` says
+    /// whether it is the named one or inherits from it.
+    pub fn gives_nodes(&self, is_a: impl Fn(&str) -> bool) -> bool {
+        self.nodes.iter().any(|given| given == ANY || is_a(given))
+    }
+
+    /// Whether it gives the right to create and delete edges of a label.
+    pub fn gives_edges(&self, label: &str) -> bool {
+        self.edges
+            .iter()
+            .any(|given| given == ANY || given == label)
+    }
+
+    /// Whether it gives the right to write an attribute of what `is_a` says is, or inherits from, the
+    /// named type, or has the named label.
+    pub fn gives_attribute(&self, is_a: impl Fn(&str) -> bool, attribute: &str) -> bool {
+        self.attributes.iter().any(|given| {
+            (given.attribute == ANY || given.attribute == attribute)
+                && (given.owner == ANY || is_a(&given.owner))
+        })
+    }
+
+    /// Whether it gives the right to apply a rule, which the grammar gives to `actor`.
+    pub fn gives_rule(&self, rule: &str, actor: Option<&str>) -> bool {
+        self.rules.iter().any(|right| match right {
+            RuleRight::Every => true,
+            RuleRight::Of(agent) => actor == Some(agent),
+            RuleRight::Named(name, _) => name == rule,
+        })
+    }
+
+    /// The rules that it gives by name, each with its place in the manifest's text.
+    pub fn named_rules(&self) -> impl Iterator<Item = (&str, Range<usize>)> {
+        self.rules.iter().filter_map(|right| match right {
+            RuleRight::Named(name, place) => Some((name.as_str(), place.clone())),
+            _ => None,
+        })
     }
 }
 
@@ -155,27 +195,21 @@ impl AgentRights {
     }
 
     fn gives_type(&self, schema: &Schema, type_id: TypeId) -> bool {
-        let mut names = self.manifest.nodes.iter();
-        names.any(|name| is_of(schema, type_id, name))
+        self.manifest
+            .gives_nodes(|name| is_of(schema, type_id, name))
     }
 
     fn gives_label(&self, schema: &Schema, label: LabelId) -> bool {
-        let name = schema.label_name(label);
-        let mut names = self.manifest.edges.iter();
-        names.any(|given| given == ANY || given == name)
+        self.manifest.gives_edges(schema.label_name(label))
     }
 
     fn gives_attribute(&self, schema: &Schema, carrier: Carrier, attribute: AttributeId) -> bool {
         let name = schema.attribute_name(attribute);
-        self.manifest.attributes.iter().any(|given| {
-            (given.attribute == ANY || given.attribute == name)
-                && match carrier {
-                    Carrier::Node(type_id) => is_of(schema, type_id, &given.owner),
-                    Carrier::Edge(label) => {
-                        given.owner == ANY || given.owner == schema.label_name(label)
-                    }
-                }
-        })
+        let is_a = |owner: &str| match carrier {
+            Carrier::Node(type_id) => is_of(schema, type_id, owner),
+            Carrier::Edge(label) => owner == schema.label_name(label),
+        };
+        self.manifest.gives_attribute(is_a, name)
     }
 
     fn refused(&self, what: &str) -> Refusal {
@@ -226,12 +260,7 @@ impl AgentRights {
 
     /// Whether the agent may apply the rule, which the grammar gives to `actor`.
     pub(crate) fn rule(&self, rule: &str, actor: Option<&str>) -> Result<(), Refusal> {
-        let gives = |right: &RuleRight| match right {
-            RuleRight::Every => true,
-            RuleRight::Of(agent) => actor == Some(agent),
-            RuleRight::Named(name) => name == rule,
-        };
-        if self.manifest.rules.iter().any(gives) {
+        if self.manifest.gives_rule(rule, actor) {
             return Ok(());
         }
         Err(self.refused(&format!("apply the rule `{rule}`")))
@@ -240,10 +269,9 @@ impl AgentRights {
 
 /// Whether the type is the one that a manifest names, or a subtype of it.
 fn is_of(schema: &Schema, type_id: TypeId, name: &str) -> bool {
-    name == ANY
-        || schema
-            .find_type(name)
-            .is_some_and(|general| schema.is_subtype(type_id, general))
+    schema
+        .find_type(name)
+        .is_some_and(|general| schema.is_subtype(type_id, general))
 }
 
 #[cfg(test)]

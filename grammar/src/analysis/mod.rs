@@ -6,6 +6,7 @@
 
 mod complete;
 mod conflict;
+mod manifest;
 mod never;
 mod reach;
 mod unused;
@@ -13,8 +14,8 @@ mod unused;
 pub use conflict::{Conflict, OVERLAY_LIMIT};
 
 use crate::parser::Finding;
-use crate::{Diagnostic, Grammar, Name, Problem};
-use dsr::{ReadError, Schema, Snapshot};
+use crate::{Diagnostic, Grammar, Name, Problem, SourceFile};
+use dsr::{Manifest, ReadError, Schema, Snapshot};
 
 /// A finding at a name.
 fn at(name: &Name, problem: Problem) -> Finding {
@@ -53,6 +54,34 @@ impl Grammar {
         }
         findings.sort_by_key(|finding| finding.span);
         crate::load::diagnostics(findings, &self.files)
+    }
+
+    /// What an agent's rules do that its manifest gives no right to but by the rule; rules of the
+    /// agent that the manifest does not give; and rules that it gives and the grammar does not have.
+    /// `file` is the manifest's, which the last point into.
+    ///
+    /// # Example
+    /// ```
+    /// let text = "name=x\n===\ntidy : active(1) agent(keeper) { { c:cup } => { } }\n";
+    /// let (grammar, _) = grammar::parse_grammar(text, "x.aggl");
+    /// let text = "agent = \"keeper\"\nrules = [\"tidy\", \"tydi\"]\n";
+    /// let manifest = dsr::Manifest::from_toml("keeper.toml", text, &dsr::Schema::open())?;
+    /// let file = grammar::SourceFile::new("keeper.toml", text);
+    /// let found = grammar.check_manifest(None, &manifest, &file);
+    /// let told: Vec<String> = found.iter().map(ToString::to_string).collect();
+    /// assert_eq!(told, [
+    ///     "this deletes a `cup`, which the manifest of `keeper` gives only by this rule",
+    ///     "no rule `tydi`",
+    /// ]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn check_manifest(
+        &self,
+        schema: Option<&Schema>,
+        manifest: &Manifest,
+        file: &SourceFile,
+    ) -> Vec<Diagnostic> {
+        manifest::check(self, schema, manifest, file)
     }
 
     /// Rules that no rule can make applicable from what a graph has: even if nothing that once

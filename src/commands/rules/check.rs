@@ -5,10 +5,10 @@ use crate::commands::graph::read_graph;
 use crate::commands::output::{print, print_json};
 use crate::commands::read_text;
 use crate::{Answer, Failure};
-use dsr::{Graph, Schema, Time, json};
-use grammar::{Conflict, Defects};
+use dsr::{Graph, Manifest, Schema, Time, json};
+use grammar::{Conflict, Defects, Diagnostic, Grammar, SourceFile};
 use serde_json::json;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The graph that shows a conflict, as graph JSON.
 fn smallest(conflict: &Conflict) -> Result<serde_json::Value, Failure> {
@@ -19,15 +19,34 @@ fn smallest(conflict: &Conflict) -> Result<serde_json::Value, Failure> {
     json::to_json(&graph.snapshot()).map_err(Failure::internal)
 }
 
+/// Files that a grammar is checked beside.
+pub(super) struct Beside<'a> {
+    pub(super) schema: Option<&'a Path>,
+    pub(super) world: Option<&'a Path>,
+    pub(super) manifests: &'a [PathBuf],
+}
+
+/// What does not fit an agent's manifest.
+fn check_manifest(
+    grammar: &Grammar,
+    schema: Option<&Schema>,
+    path: &Path,
+) -> Result<Vec<Diagnostic>, Failure> {
+    let (name, text) = (path.display().to_string(), read_text(path)?);
+    let open = Schema::open();
+    let manifest = Manifest::from_toml(&name, &text, schema.unwrap_or(&open));
+    let manifest = manifest.map_err(|error| Failure::Input(error.into()))?;
+    Ok(grammar.check_manifest(schema, &manifest, &SourceFile::new(&name, &text)))
+}
+
 pub(super) fn check(
     file: &Path,
-    schema: Option<&Path>,
-    world: Option<&Path>,
+    beside: &Beside<'_>,
     conflicts: bool,
     as_json: bool,
 ) -> Result<Answer, Failure> {
     let (grammar, mut diagnostics) = read(file)?;
-    let schema = schema.map(|path| {
+    let schema = beside.schema.map(|path| {
         Schema::from_toml(&path.display().to_string(), &read_text(path)?)
             .map_err(|error| Failure::Input(error.into()))
     });
@@ -35,9 +54,12 @@ pub(super) fn check(
     if let Some(schema) = &schema {
         diagnostics.extend(grammar.check_schema(schema));
     }
+    for manifest in beside.manifests {
+        diagnostics.extend(check_manifest(&grammar, schema.as_ref(), manifest)?);
+    }
     let broken = grammar::has_errors(&diagnostics);
     diagnostics.extend(grammar.analyse(schema.as_ref()));
-    if let Some(world) = world {
+    if let Some(world) = beside.world {
         let graph = read_graph(world)?;
         let unreachable = grammar.unreachable(&graph.snapshot());
         diagnostics.extend(unreachable.map_err(Failure::internal)?);
@@ -48,9 +70,9 @@ pub(super) fn check(
         Vec::new()
     };
     diagnostics.extend(found.iter().map(|conflict| conflict.diagnostic.clone()));
-    diagnostics.sort_by(|a, b| {
-        let place = |d: &grammar::Diagnostic| (d.span.file, d.span.start);
-        place(a).cmp(&place(b))
+    diagnostics.sort_by_key(|d| {
+        let included = grammar.files.iter().position(|file| *file == d.file);
+        (included.unwrap_or(usize::MAX), d.span.start)
     });
     if as_json {
         let conflicts: Vec<_> = found
