@@ -1,7 +1,7 @@
 //! Finds the matches of a pattern with other engines, for `cortex bench rules`: a program of its
 //! own, because SQLite alone takes longer to compile than Cortex.
 //!
-//! `cortex-peers vf2|sqlite WORLD PATTERN` prints the seconds that all matches took (loading and
+//! `cortex-peers vf2|sqlite|sqlite_tuned WORLD PATTERN` prints the seconds that all matches took (loading and
 //! indexing not counted) and how many there are. A world is lines `n TYPE`, from id 1 on, and
 //! `e FROM LABEL TO`; a pattern is words `VARIABLE:TYPE` and `FROM-LABEL-TO`.
 #![forbid(unsafe_code)]
@@ -13,6 +13,7 @@
 mod sqlite;
 mod vf2_crate;
 
+use sqlite::Indices;
 use std::error::Error;
 use std::io::Write;
 use std::process::ExitCode;
@@ -80,14 +81,15 @@ fn pattern(text: &str, names: &mut Names) -> Option<Labelled> {
 fn measure() -> Result<(f64, u64), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [engine, file, query] = &arguments[..] else {
-        return Err("usage: cortex-peers vf2|sqlite WORLD PATTERN".into());
+        return Err("usage: cortex-peers vf2|sqlite|sqlite_tuned WORLD PATTERN".into());
     };
     let mut names = Names::default();
     let data = world(&std::fs::read_to_string(file)?, &mut names).ok_or("not a world")?;
     let query = pattern(query, &mut names).ok_or("not a pattern")?;
     match engine.as_str() {
         "vf2" => Ok(vf2_crate::all(&data, &query)),
-        "sqlite" => Ok(sqlite::all(&data, &query)?),
+        "sqlite" => Ok(sqlite::all(&data, &query, Indices::Plain)?),
+        "sqlite_tuned" => Ok(sqlite::all(&data, &query, Indices::Tuned)?),
         other => Err(format!("no engine `{other}`").into()),
     }
 }
@@ -110,13 +112,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn both_engines_find_the_same() {
+    fn all_engines_find_the_same() {
         let text = "n room\nn room\nn room\nn robot\ne 1 connected 2\ne 2 connected 1\n\
                     e 2 connected 3\ne 3 connected 2\ne 4 in 2\n";
         let mut names = Names::default();
         let data = world(text, &mut names).unwrap();
         let query = pattern("r:robot a:room b:room r-in-a a-connected-b", &mut names).unwrap();
         assert_eq!(vf2_crate::all(&data, &query).1, 2);
-        assert_eq!(sqlite::all(&data, &query).unwrap().1, 2);
+        for indices in [Indices::Plain, Indices::Tuned] {
+            assert_eq!(sqlite::all(&data, &query, indices).unwrap().1, 2);
+        }
     }
 }

@@ -48,7 +48,7 @@ impl Indoor {
         let rooms = world.add("room", width * width);
         let people = world.add("person", size / 4);
         let tables = world.add("table", size * 7 / 100);
-        let robots = world.add("robot", (size / 1000).max(1));
+        let robots = world.add("robot", (size / 2000).max(1));
         let cups = world.add("cup", size - world.nodes.len());
         for (index, room) in rooms.clone().enumerate() {
             let right = (index % width + 1 < width).then_some(room + 1);

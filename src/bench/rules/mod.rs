@@ -193,7 +193,7 @@ fn matching(
         quantities.push(Quantity::new(named("first"), first, "us"));
         quantities.push(Quantity::new(named("plan_and_all"), planned, "us"));
         quantities.push(Quantity::new(named("all"), whole, "us"));
-        for engine in ["vf2", "sqlite"] {
+        for engine in ["vf2", "sqlite", "sqlite_tuned"] {
             let Some(peers) = peers else { continue };
             let found = peers.all(engine, file, &words(rule))?;
             if found.count.is_some_and(|found| found != count) {

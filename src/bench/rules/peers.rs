@@ -41,7 +41,7 @@ impl Peers {
         beside.is_file().then_some(Self(beside))
     }
 
-    /// All matches of `pattern` in the world of a file, by `engine`: `vf2` or `sqlite`.
+    /// All matches of `pattern` in the world of a file, by `engine`: `vf2`, `sqlite` or `sqlite_tuned`.
     pub(super) fn all(
         &self,
         engine: &str,
