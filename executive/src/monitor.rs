@@ -180,7 +180,7 @@ fn next(
     if pending && ground.binding.len() < ground.rule.bound_nodes().count() {
         // Nodes that an earlier step made are chosen when it has made them.
         let matches = grammar.matches(snapshot, ground.rule, &ground.binding);
-        let first = matches.and_then(|mut matches| Ok(matches.next().transpose()?));
+        let first = matches.and_then(|mut matches| matches.next().transpose());
         match first {
             Ok(Some(binding)) => ground.binding = binding,
             Ok(None) => return Ok(broken("nothing in the graph matches it")),

@@ -82,12 +82,49 @@ pub fn schema(bytes: &[u8]) {
     drop(Schema::from_toml("schema.toml", &text(bytes)));
 }
 
-/// A grammar: parsed, checked, printed.
+/// A grammar: parsed, checked, printed, and its rules matched and applied.
 pub fn grammar(bytes: &[u8]) {
-    let (_, diagnostics) = grammar::parse_grammar(&text(bytes), "rules.aggl");
-    for diagnostic in diagnostics {
+    let (grammar, diagnostics) = grammar::parse_grammar(&text(bytes), "rules.aggl");
+    for diagnostic in &diagnostics {
         assert!(diagnostic.line_and_column().0 > 0, "lines count from 1");
     }
+    drop(grammar.analyse(None));
+    if grammar::has_errors(&diagnostics) {
+        return;
+    }
+    let (_, again) = grammar::parse_grammar(&grammar.to_string(), "rules.aggl");
+    assert!(
+        !grammar::has_errors(&again),
+        "what was printed cannot be read"
+    );
+    let snapshot = left_sides(&grammar).snapshot();
+    for rule in grammar.all_rules().take(20) {
+        let Ok(matches) = grammar.matches(&snapshot, rule, &grammar::Binding::new()) else {
+            continue;
+        };
+        let mut matches = matches.within(50_000).take(100);
+        if let Some(Ok(binding)) = matches.next() {
+            drop(grammar.apply(&snapshot, &rule.name, &binding));
+        }
+        matches.for_each(drop);
+    }
+}
+
+/// A graph in which each rule's left side is once, as far as a graph can have it.
+fn left_sides(grammar: &grammar::Grammar) -> Graph {
+    let mut graph = Graph::in_memory(Schema::open());
+    for (index, rule) in grammar.rules.iter().enumerate().take(20) {
+        let name = |variable: &str| format!("{variable}{index}");
+        let mut transaction = Transaction::new();
+        for node in rule.bound_nodes() {
+            transaction.create_node(&node.type_name, &name(&node.variable), vec![]);
+        }
+        for edge in rule.left.edges.iter().filter(|edge| !edge.negated) {
+            transaction.create_edge(name(&edge.from), &edge.label, name(&edge.to));
+        }
+        drop(graph.commit(&transaction, "fuzz", Time::default()));
+    }
+    graph
 }
 
 /// A goal.

@@ -57,7 +57,7 @@ impl Grammar {
             return Ok(None);
         };
         let problem = self.goal_problem(snapshot, goal, &constants)?;
-        Ok(Matches::new(snapshot, problem)?.next().transpose()?)
+        Matches::new(snapshot, problem)?.next().transpose()
     }
 
     /// What keeps the goal from holding; `None` if it holds. Where a goal has variables and

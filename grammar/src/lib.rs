@@ -87,7 +87,7 @@ mod testing;
 mod unfold;
 
 pub use analysis::{Conflict, OVERLAY_LIMIT};
-pub use apply::{ApplyError, CHANGE_LIMIT, CHOICE_LIMIT};
+pub use apply::{ApplyError, CHANGE_LIMIT};
 pub use binding::Binding;
 pub use diagnostic::{Diagnostic, Problem, Severity};
 pub use goal::GoalConstants;
@@ -97,8 +97,8 @@ pub use grammar::{
 };
 pub use load::{Defects, Loader, has_errors, load_grammar, parse_goal, parse_grammar};
 pub use matching::{
-    End, MatchDelta, MatchError, Matcher, Matches, Obstacle, RuleMatch, SearchPlan, SearchStep,
-    ValueError, Watch,
+    CHOICE_LIMIT, End, MatchDelta, MatchError, Matcher, Matches, Obstacle, RuleMatch, SEARCH_LIMIT,
+    SearchPlan, SearchStep, ValueError, Watch,
 };
 pub use number::Number;
 pub use parser::DEPTH_LIMIT;

@@ -7,9 +7,9 @@ mod working;
 
 pub use working::WorkingGraph;
 
-use crate::matching::{Compiler, Environment, Frame, Link, Plan, Planned, Slot};
-use crate::{Grammar, MatchError, PatternEdge, Rule};
-use dsr::{EdgeKey, NodeId, ReadError, Schema, Snapshot, TypeId};
+use crate::matching::{Compiler, Environment, Frame, Link, Plan, Planned, Slot, Slots};
+use crate::{Grammar, MatchError, PatternEdge, Rule, SEARCH_LIMIT};
+use dsr::{EdgeKey, NodeId, Schema, Snapshot, TypeId};
 use std::sync::Arc;
 
 /// Why a rule cannot be applied in memory.
@@ -65,6 +65,8 @@ pub struct Rewriter {
     /// The slots that were given last, and the plan for them.
     plan: Option<Arc<Plan>>,
     environment: Environment,
+    /// What the search looks up, by slot: kept only to be filled again.
+    nodes: Vec<Option<NodeId>>,
     unlinks: Vec<Link>,
     deletes: Vec<usize>,
     retypes: Vec<(usize, TypeId)>,
@@ -98,7 +100,8 @@ impl Rewriter {
             compiler.declare(&node.variable);
         }
         let mut rewriter = Self {
-            environment: Vec::new(),
+            environment: Environment::new(0, SEARCH_LIMIT),
+            nodes: vec![None; query.variables.len()],
             planned: Planned::new(query),
             plan: None,
             unlinks: Vec::new(),
@@ -131,7 +134,7 @@ impl Rewriter {
             }
         }
         let slots = compiler.slots().max(rewriter.planned.query().slots);
-        rewriter.environment = vec![Slot::Unbound; slots];
+        rewriter.environment.extend_to(slots);
         for edge in rule.right.edges.iter().filter(|edge| !edge.negated) {
             let link = compiler.link(edge)?;
             if link.label.is_none() {
@@ -176,13 +179,13 @@ impl Rewriter {
     /// if there is none.
     ///
     /// # Errors
-    /// [`ReadError`] where a condition reads an attribute and the snapshot that the graph was made
-    /// of is too old.
+    /// [`MatchError`] where a condition reads an attribute and the snapshot that the graph was made
+    /// of is too old, or where too many nodes had to be tried.
     pub fn rewrite(
         &mut self,
         graph: &mut WorkingGraph,
         given: &[(usize, NodeId)],
-    ) -> Result<bool, ReadError> {
+    ) -> Result<bool, MatchError> {
         let slots = || given.iter().map(|(slot, _)| *slot);
         let plan = match &self.plan {
             Some(plan) if plan.given.iter().copied().eq(slots()) => plan,
@@ -192,6 +195,7 @@ impl Rewriter {
             }
         };
         self.environment.fill(Slot::Unbound);
+        self.environment.renew();
         for &(slot, node) in given {
             self.environment[slot] = Slot::Node(node);
         }
@@ -200,7 +204,11 @@ impl Rewriter {
             query: self.planned.query(),
             plan,
         };
-        if !frame.first(&mut self.environment)? {
+        let found = frame.first(&mut Slots {
+            environment: &mut self.environment,
+            nodes: &mut self.nodes,
+        });
+        if !found? {
             return Ok(false);
         }
         for link in &self.unlinks {

@@ -8,10 +8,18 @@ pub(crate) mod repair;
 
 use crate::{Grammar, parse_grammar};
 use dsr::{Graph, Schema, Time, Transaction, Value};
+use proptest::prelude::ProptestConfig;
 use std::sync::Arc;
 
 /// The rules that a robot in a care centre goes by.
 pub(crate) const CARE: &str = include_str!("testing/care.aggl");
+
+/// So many cases of a property; more, in proportion, where `PROPTEST_CASES` asks for more than the 256
+/// that are its default.
+pub(crate) fn cases(usually: u32) -> ProptestConfig {
+    let asked = ProptestConfig::default().cases;
+    ProptestConfig::with_cases((u64::from(usually) * u64::from(asked) / 256) as u32)
+}
 
 /// Reads a grammar that has nothing wrong with it.
 pub(crate) fn read(text: &str) -> Grammar {

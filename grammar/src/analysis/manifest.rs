@@ -98,13 +98,13 @@ impl Beyond<'_> {
         }
         for edge in rule.left.edges.iter().filter(|edge| !edge.negated) {
             let kept = rule.right.edge(&edge.from, &edge.label, &edge.to);
-            if !kept.is_some_and(|kept| !kept.negated) {
+            if kept.is_none_or(|kept| kept.negated) {
                 self.link(&edge.label, "removes");
             }
         }
         for edge in rule.right.edges.iter().filter(|edge| !edge.negated) {
             let there = rule.left.edge(&edge.from, &edge.label, &edge.to);
-            if !there.is_some_and(|there| !there.negated) {
+            if there.is_none_or(|there| there.negated) {
                 self.link(&edge.label, "makes");
             }
         }

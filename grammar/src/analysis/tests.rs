@@ -162,7 +162,7 @@ fn pair() -> impl Strategy<Value = Grammar> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(60))]
+    #![proptest_config(crate::testing::cases(60))]
 
     #[test]
     fn critical_pairs_are_those_of_every_small_graph(grammar in pair()) {
@@ -187,7 +187,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(300))]
+    #![proptest_config(crate::testing::cases(300))]
 
     #[test]
     fn nothing_that_can_be_written_breaks_an_analysis(text in soup(), rules in AWKWARD.grammar()) {

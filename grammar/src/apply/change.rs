@@ -4,7 +4,7 @@
 //! and none is superfluous in the snapshot that they were made for.
 
 use super::ApplyError;
-use crate::matching::{Slot, words};
+use crate::matching::{CHOICE_LIMIT, Slot, words};
 use crate::{Comparison, Name, Number};
 use dsr::{
     EdgeKey, EdgeRef, NodeId, NodeRef, Operation, Owner, ReadError, Snapshot, Value, ValueKind,
@@ -13,8 +13,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// How many changes quantified effects of one application may make.
 pub const CHANGE_LIMIT: usize = 100_000;
-/// How many choices quantified effects of one application may go through.
-pub const CHOICE_LIMIT: usize = 5_000_000;
 
 /// A node that is there, or one that is being created.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -43,8 +41,6 @@ pub(super) struct Changes<'a> {
     wanted: BTreeSet<LinkKey>,
     unwanted: BTreeSet<LinkKey>,
     assigned: BTreeMap<(Target, String), Value>,
-    /// How many choices of quantified effects were made.
-    choices: usize,
 }
 
 fn end(slot: Slot) -> Option<End> {
@@ -65,20 +61,18 @@ impl<'a> Changes<'a> {
             wanted: BTreeSet::new(),
             unwanted: BTreeSet::new(),
             assigned: BTreeMap::new(),
-            choices: 0,
         }
     }
 
-    /// Counts one more choice of a quantified effect.
-    pub(super) fn choose(&mut self) -> Result<(), ApplyError> {
-        self.choices += 1;
+    /// Looks whether there are more changes than one rule may make.
+    pub(super) fn limit(&self) -> Result<(), ApplyError> {
         let changes = self.created.len()
             + self.deleted.len()
             + self.retyped.len()
             + self.wanted.len()
             + self.unwanted.len()
             + self.assigned.len();
-        if changes > CHANGE_LIMIT || self.choices > CHOICE_LIMIT {
+        if changes > CHANGE_LIMIT {
             return Err(ApplyError::TooMuch {
                 changes: CHANGE_LIMIT,
                 choices: CHOICE_LIMIT,

@@ -190,7 +190,7 @@ impl Action {
             // Names of created nodes follow the order.
             Self::Forall { choices, body } => {
                 let mut run = |environment: &mut Environment| {
-                    changes.choose()?;
+                    changes.limit()?;
                     for action in body {
                         action.run(snapshot, environment, changes)?;
                     }

@@ -6,9 +6,9 @@
 mod change;
 mod effect;
 
-use crate::matching::{Compiler, Environment, Link, Slot};
+use crate::matching::{CHOICE_LIMIT, Compiler, Environment, Interrupt, Link, Slot};
 use crate::{Binding, Grammar, MatchError, Obstacle, Rule};
-pub use change::{CHANGE_LIMIT, CHOICE_LIMIT};
+pub use change::CHANGE_LIMIT;
 use change::{Changes, End};
 use dsr::{Change, NodeId, Operation, ReadError, Refusal, RuleEngine, Snapshot};
 use std::sync::Arc;
@@ -68,11 +68,23 @@ pub enum ApplyError {
         /// [`CHANGE_LIMIT`].
         changes: usize,
         /// [`CHOICE_LIMIT`].
-        choices: usize,
+        choices: u64,
     },
     /// The rule could not be looked at.
     #[error(transparent)]
     Match(#[from] MatchError),
+}
+
+impl From<Interrupt> for ApplyError {
+    fn from(interrupt: Interrupt) -> Self {
+        match interrupt {
+            Interrupt::Read(error) => error.into(),
+            Interrupt::Limit(_) => Self::TooMuch {
+                changes: CHANGE_LIMIT,
+                choices: CHOICE_LIMIT,
+            },
+        }
+    }
 }
 
 impl From<ReadError> for ApplyError {
@@ -120,7 +132,7 @@ impl Grammar {
             return Err(ApplyError::Obstacle(Box::new(obstacle)));
         }
         let mut compiler = Compiler::new(&self.types, snapshot.schema());
-        let mut environment = Environment::new();
+        let mut environment = Environment::new(0, CHOICE_LIMIT);
         for node in rule.bound_nodes() {
             compiler.declare(&node.variable);
             let bound = binding.get(&node.variable);
@@ -135,7 +147,7 @@ impl Grammar {
             &mut changes,
         )?;
         let effects = compiler.effects(&rule.effect)?;
-        environment.resize(compiler.slots(), Slot::Unbound);
+        environment.extend_to(compiler.slots());
         for effect in &effects {
             effect.run(snapshot, &mut environment, &mut changes)?;
         }

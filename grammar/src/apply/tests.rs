@@ -315,9 +315,14 @@ fn effects_that_would_fill_the_memory_are_refused() {
     let nodes: Vec<(&str, &str)> = nodes.iter().map(|name| ("t", name.as_str())).collect();
     let mut many = graph(&nodes, &[]);
     let before = describe(&many);
-    for body in ["(create n t)", "(when (l a b) (create n t))"] {
-        let all = "(forall a:t b:t c:t (forall d:t e:t f:t ";
-        let grammar = rule(&format!("{{ }} => {{ }} effect {{ {all} {body})) }}"));
+    let all = "(forall a:t b:t c:t (forall d:t e:t f:t ";
+    let nowhere = "(exists u:t v:t w:t (exists x:t y:t z:t (and (= x y) (not (= x y)))))";
+    for effect in [
+        format!("{all} (create n t)))"),
+        format!("{all} (when (l a b) (create n t))))"),
+        format!("(when {nowhere} (create n t))"),
+    ] {
+        let grammar = rule(&format!("{{ }} => {{ }} effect {{ {effect} }}"));
         let error = apply(&mut many, &grammar, "r", &[]).unwrap_err();
         assert!(
             error.contains("beyond 100000 changes or 5000000 choices"),
@@ -328,7 +333,7 @@ fn effects_that_would_fill_the_memory_are_refused() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(2000))]
+    #![proptest_config(crate::testing::cases(2000))]
 
     #[test]
     fn applying_does_what_the_oracle_does(model in Model::strategy(), rule in FEW.rule()) {

@@ -53,7 +53,7 @@ fn a_goal_holds_once_the_robot_is_there_and_says_what_is_missing_before() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(1000))]
+    #![proptest_config(crate::testing::cases(1000))]
 
     #[test]
     fn a_goal_holds_where_the_oracle_says_so(

@@ -1,9 +1,10 @@
 //! Where nodes for a variable come from.
 //!
-//! Guarantee: each source gives every node once, in an order that the graph alone determines.
+//! Guarantee: each source gives every node once, with its exact type, in an order that the graph
+//! alone determines.
 
 use super::host::Host;
-use dsr::{NodeId, ReadError, TypeId};
+use dsr::{EdgeKey, NodeId, ReadError, TypeId};
 use std::fmt;
 use std::sync::Arc;
 
@@ -17,8 +18,18 @@ pub(crate) enum Candidates<'h, H: Host + 'h> {
         next: usize,
         ids: Option<H::Ids<'h>>,
     },
-    Ids(H::Ids<'h>),
+    /// The nodes at the other ends of a node's edges.
+    Ends(H::Ends<'h>),
+    /// The nodes that an index has.
+    Indexed(&'h H, H::Ids<'h>),
     Edges(H::Edges<'h>),
+}
+
+/// What one or two variables could stand for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Candidate {
+    Node(NodeId, TypeId),
+    Edge(EdgeKey, [TypeId; 2]),
 }
 
 impl<'h, H: Host> Candidates<'h, H> {
@@ -39,12 +50,15 @@ impl<H: Host> fmt::Debug for Candidates<'_, H> {
 }
 
 impl<H: Host> Iterator for Candidates<'_, H> {
-    /// A node, or both ends of an edge.
-    type Item = Result<(NodeId, Option<NodeId>), ReadError>;
+    type Item = Result<Candidate, ReadError>;
 
+    #[inline]
     fn next(&mut self) -> Option<Self::Item> {
         match self {
-            Self::Nothing => None,
+            Self::Ends(ends) => {
+                let end = ends.next()?;
+                Some(end.map(|(id, exact)| Candidate::Node(id, exact)))
+            }
             Self::Members {
                 host,
                 types,
@@ -52,16 +66,30 @@ impl<H: Host> Iterator for Candidates<'_, H> {
                 ids,
             } => loop {
                 if let Some(id) = ids.as_mut().and_then(Iterator::next) {
-                    return Some(id.map(|id| (id, None)));
+                    // It is of the type whose members come last.
+                    let exact = types[*next - 1];
+                    return Some(id.map(|id| Candidate::Node(id, exact)));
                 }
                 let exact = *types.get(*next)?;
                 *next += 1;
                 *ids = Some(host.members(exact));
             },
-            Self::Ids(ids) => ids.next().map(|id| id.map(|id| (id, None))),
-            Self::Edges(edges) => edges
-                .next()
-                .map(|key| key.map(|key| (key.from, Some(key.to)))),
+            Self::Indexed(host, ids) => loop {
+                let found = ids.next()?.and_then(|id| Ok((id, host.find(id)?)));
+                match found {
+                    // What is worked on in memory may have lost a node that the index has.
+                    Ok((_, None)) => {}
+                    Ok((id, Some(node))) => {
+                        return Some(Ok(Candidate::Node(id, host.type_of(node))));
+                    }
+                    Err(error) => return Some(Err(error)),
+                }
+            },
+            Self::Edges(edges) => {
+                let edge = edges.next()?;
+                Some(edge.map(|(key, types)| Candidate::Edge(key, types)))
+            }
+            Self::Nothing => None,
         }
     }
 }

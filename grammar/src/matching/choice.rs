@@ -3,12 +3,12 @@
 //! Guarantee: no choice is left out at which the quantified formula could come out otherwise than
 //! it does without it.
 
-use super::candidates::Candidates;
+use super::candidates::{Candidate, Candidates};
 use super::domain::Domain;
-use super::evaluate::{Environment, node};
+use super::environment::{Environment, Interrupt, node};
 use super::host::Host;
 use super::program::{Link, Slot, Test};
-use dsr::{NodeId, ReadError};
+use dsr::ReadError;
 
 /// Variables in neighbouring slots, and where their nodes are looked for.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,7 +62,7 @@ impl Choices {
 
     /// Puts every choice that matters into the slots, until `visit` gives something. The slots
     /// keep the choice that it gave something for.
-    pub(crate) fn each<H: Host, T, E: From<ReadError>>(
+    pub(crate) fn each<H: Host, T, E: From<Interrupt> + From<ReadError>>(
         &self,
         host: &H,
         environment: &mut Environment,
@@ -72,7 +72,7 @@ impl Choices {
     }
 
     /// The same, by ascending ids.
-    pub(crate) fn each_in_order<H: Host, T, E: From<ReadError>>(
+    pub(crate) fn each_in_order<H: Host, T, E: From<Interrupt> + From<ReadError>>(
         &self,
         host: &H,
         environment: &mut Environment,
@@ -81,7 +81,7 @@ impl Choices {
         self.descend(0, true, host, environment, visit)
     }
 
-    fn descend<H: Host, T, E: From<ReadError>>(
+    fn descend<H: Host, T, E: From<Interrupt> + From<ReadError>>(
         &self,
         index: usize,
         sorted: bool,
@@ -94,12 +94,12 @@ impl Choices {
         };
         let slot = self.first + index;
         let nodes = variable.nodes(slot, host, environment)?;
-        let mut try_node = |id: NodeId| {
-            if variable.near.is_some()
-                && !host
-                    .type_of(id)?
-                    .is_some_and(|exact| variable.domain.contains(exact))
-            {
+        let mut try_node = |candidate: Candidate| {
+            environment.spend()?;
+            let Candidate::Node(id, exact) = candidate else {
+                return Ok(None);
+            };
+            if !variable.domain.contains(exact) {
                 return Ok(None);
             }
             environment[slot] = Slot::Node(id);
@@ -108,16 +108,16 @@ impl Choices {
         if sorted {
             let mut all = nodes.collect::<Result<Vec<_>, _>>()?;
             all.sort_unstable();
-            for (id, _) in all {
-                let found = try_node(id)?;
+            for candidate in all {
+                let found = try_node(candidate)?;
                 if found.is_some() {
                     return Ok(found);
                 }
             }
             return Ok(None);
         }
-        for id in nodes {
-            let found = try_node(id?.0)?;
+        for candidate in nodes {
+            let found = try_node(candidate?)?;
             if found.is_some() {
                 return Ok(found);
             }
@@ -139,15 +139,15 @@ impl Variable {
         };
         let inwards = link.from == slot;
         let other = node(environment, if inwards { link.to } else { link.from });
+        let other = other.map(|other| host.find(other)).transpose()?.flatten();
         let (Some(other), Some(label)) = (other, link.label) else {
             return Ok(Candidates::Nothing);
         };
-        let ids = if inwards {
-            host.sources(other, label)?
+        Ok(Candidates::Ends(if inwards {
+            host.sources(other, label)
         } else {
-            host.targets(other, label)?
-        };
-        Ok(ids.map_or(Candidates::Nothing, Candidates::Ids))
+            host.targets(other, label)
+        }))
     }
 }
 

@@ -3,13 +3,11 @@
 //! Guarantee: every formula has a truth value. A term that has no value (an attribute that is not
 //! there, a division by zero, an overflow) makes the comparison that it stands in not hold.
 
+use super::environment::{Environment, Interrupt};
 use super::host::Host;
 use super::program::{Link, Slot, Term, Test};
 use crate::Number;
-use dsr::{EdgeKey, NodeId, ReadError, Value};
-
-/// What each slot stands for.
-pub(crate) type Environment = Vec<Slot>;
+use dsr::{EdgeKey, ReadError, Value};
 
 /// The key of a link whose ends are nodes of the graph and whose label the schema has.
 fn key(link: &Link, environment: &[Slot]) -> Option<EdgeKey> {
@@ -37,7 +35,7 @@ impl Test {
         &self,
         host: &H,
         environment: &mut Environment,
-    ) -> Result<bool, ReadError> {
+    ) -> Result<bool, Interrupt> {
         match self {
             Self::Link(link) => Ok(is_there(host, link, environment)? != link.negated),
             Self::Same(first, second) => {
@@ -68,13 +66,13 @@ impl Test {
             }
             Self::Exists(choices, body) => {
                 let mut found = |environment: &mut Environment| {
-                    Ok::<_, ReadError>(body.holds(host, environment)?.then_some(()))
+                    Ok::<_, Interrupt>(body.holds(host, environment)?.then_some(()))
                 };
                 Ok(choices.each(host, environment, &mut found)?.is_some())
             }
             Self::Forall(choices, body) => {
                 let mut refuted = |environment: &mut Environment| {
-                    Ok::<_, ReadError>((!body.holds(host, environment)?).then_some(()))
+                    Ok::<_, Interrupt>((!body.holds(host, environment)?).then_some(()))
                 };
                 Ok(choices.each(host, environment, &mut refuted)?.is_none())
             }
@@ -95,7 +93,10 @@ impl Term {
                 let (Slot::Node(node), Some(attribute)) = (environment[*node], *attribute) else {
                     return Ok(None);
                 };
-                host.node_value(node, attribute)?
+                match host.find(node)? {
+                    Some(node) => host.node_value(node, attribute)?,
+                    None => None,
+                }
             }
             Self::EdgeAttribute { link, attribute } => {
                 let (Some(key), Some(attribute)) = (key(link, environment), *attribute) else {
@@ -115,13 +116,5 @@ impl Term {
                 operator.compute(&numbers).and_then(Number::into_value)
             }
         })
-    }
-}
-
-/// The node in a slot.
-pub(crate) fn node(environment: &[Slot], slot: usize) -> Option<NodeId> {
-    match environment[slot] {
-        Slot::Node(node) => Some(node),
-        _ => None,
     }
 }

@@ -5,6 +5,7 @@
 mod candidates;
 mod choice;
 mod domain;
+mod environment;
 mod evaluate;
 mod explain;
 mod host;
@@ -18,6 +19,7 @@ mod search;
 mod statistics;
 mod watch;
 
+pub use environment::{CHOICE_LIMIT, SEARCH_LIMIT};
 pub use explain::{SearchPlan, SearchStep};
 pub use matcher::Matcher;
 pub use obstacle::{End, Obstacle};
@@ -26,14 +28,14 @@ pub use watch::{MatchDelta, RuleMatch, Watch};
 
 pub(crate) use choice::Choices;
 pub(crate) use domain::Domain as MatchDomain;
-pub(crate) use evaluate::Environment;
+pub(crate) use environment::{Environment, Interrupt};
 pub(crate) use host::Host;
 pub(crate) use obstacle::words;
 pub(crate) use plan::Plan;
 pub(crate) use planned::Planned;
 pub(crate) use program::{Compiler, Link, Slot, Term, Test};
 pub(crate) use query::Problem;
-pub(crate) use search::Frame;
+pub(crate) use search::{Frame, Slots};
 
 use crate::{Binding, Condition, Expression, Grammar, Number, PatternEdge, PatternNode, Rule};
 use dsr::{ReadError, Snapshot, Value};
@@ -46,6 +48,13 @@ pub enum MatchError {
     /// The snapshot cannot be read (any more).
     #[error(transparent)]
     Read(#[from] ReadError),
+    /// So many nodes were tried that it was given up: quantifiers are nested, or nothing joins the
+    /// nodes of a pattern. See [`CHOICE_LIMIT`] and [`SEARCH_LIMIT`].
+    #[error("given up after {limit} nodes had been tried for its variables")]
+    Limit {
+        /// How many.
+        limit: u64,
+    },
     /// Something uses a variable that is not in scope; checking the grammar reports the place.
     #[error("no variable `{variable}` is in scope")]
     UnknownVariable {
@@ -70,6 +79,15 @@ pub enum MatchError {
         /// What was probably meant.
         suggestion: Option<String>,
     },
+}
+
+impl From<Interrupt> for MatchError {
+    fn from(interrupt: Interrupt) -> Self {
+        match interrupt {
+            Interrupt::Read(error) => Self::Read(error),
+            Interrupt::Limit(limit) => Self::Limit { limit },
+        }
+    }
 }
 
 fn did_you_mean(suggestion: Option<&str>) -> String {
@@ -124,7 +142,7 @@ impl Grammar {
     ///
     /// # Errors
     /// [`MatchError`] where `partial` or the rule uses variables that the rule does not have, or
-    /// the snapshot cannot be read; the iterator gives a [`ReadError`] that comes up later.
+    /// the snapshot cannot be read; the iterator gives one that comes up later.
     ///
     /// # Complexity
     /// Backtracking along a plan that starts where the snapshot's counts of nodes per type and
@@ -278,7 +296,7 @@ impl Grammar {
         binding: &Binding,
     ) -> Result<Value, ValueError> {
         let mut compiler = Compiler::new(&self.types, snapshot.schema());
-        let mut environment = Environment::new();
+        let mut environment = Environment::new(0, CHOICE_LIMIT);
         for node in rule.bound_nodes() {
             compiler.declare(&node.variable);
             let bound = binding.get(&node.variable);

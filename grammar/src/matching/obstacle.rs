@@ -2,8 +2,9 @@
 //!
 //! Guarantee: an obstacle is given exactly where the rule does not match.
 
-use super::evaluate::{Environment, is_there, node};
-use super::program::{Compiler, Slot};
+use super::environment::{CHOICE_LIMIT, Environment, node};
+use super::evaluate::is_there;
+use super::program::Compiler;
 use super::{MatchError, Problem, conjuncts};
 use crate::{AttributePath, Condition, Expression, Grammar, Name, PatternEdge, PatternNode};
 use dsr::{NodeId, ReadError, Snapshot, Value};
@@ -142,6 +143,7 @@ impl Grammar {
             return Ok(Some(obstacle));
         }
         let Problem { query, environment } = &mut problem;
+        environment.set_limit(CHOICE_LIMIT);
         for (edge, link) in edges.iter().zip(&query.links) {
             if is_there(snapshot, link, environment)? != link.negated {
                 continue;
@@ -226,10 +228,7 @@ struct Words<'a, 'e> {
 impl Words<'_, '_> {
     fn holds(&mut self, condition: &Condition) -> Result<bool, MatchError> {
         let test = self.compiler.test(condition)?;
-        if self.environment.len() < self.compiler.slots() {
-            self.environment
-                .resize(self.compiler.slots(), Slot::Unbound);
-        }
+        self.environment.extend_to(self.compiler.slots());
         Ok(test.holds(self.snapshot, self.environment)?)
     }
 
@@ -292,8 +291,7 @@ impl Words<'_, '_> {
                 let outer = self.compiler.scope();
                 let choices = self.compiler.quantify(variables);
                 let test = self.compiler.test(body)?;
-                let slots = self.compiler.slots().max(self.environment.len());
-                self.environment.resize(slots, Slot::Unbound);
+                self.environment.extend_to(self.compiler.slots());
                 let snapshot = self.snapshot;
                 let mut fails = |environment: &mut Environment| {
                     let holds = test.holds(snapshot, environment)?;

@@ -31,8 +31,6 @@ pub(crate) struct Step {
     pub(crate) binds: [Option<usize>; 2],
     /// Slots bound before it that a node of each new slot could be, too, but must not.
     pub(crate) others: [Vec<usize>; 2],
-    /// Whether the types of its nodes must be looked at.
-    pub(crate) typed: bool,
     /// Links (by index) tested after it.
     pub(crate) links: Vec<usize>,
     /// Conditions (by index) tested after it.
@@ -343,7 +341,6 @@ impl Planner<'_> {
             source,
             binds,
             others,
-            typed: !matches!(source, Source::Nodes { .. }),
             links: self.links_between(bound, before, source.link()).collect(),
             tests: self.tests_of(bound, Some(before)).collect(),
             candidates: extension.candidates,

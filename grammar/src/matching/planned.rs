@@ -5,7 +5,7 @@
 use super::host::Host;
 use super::plan::{Plan, plan};
 use super::query::Query;
-use super::statistics::Statistics;
+use super::statistics::{FEW, Statistics};
 use dsr::{ReadError, Version};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -38,10 +38,25 @@ impl Planned {
         host: &H,
         given: &[usize],
     ) -> Result<Arc<Plan>, ReadError> {
+        let mut unknown = u64::MAX;
+        self.plan_after(&mut unknown, host, given)
+    }
+
+    /// The same, where it is known how many nodes and edges have changed since the counts were looked
+    /// at: where these are so few that no count that matters can have doubled or halved, none is
+    /// looked at, else counting begins afresh.
+    pub(crate) fn plan_after<H: Host>(
+        &mut self,
+        changes: &mut u64,
+        host: &H,
+        given: &[usize],
+    ) -> Result<Arc<Plan>, ReadError> {
         let version = host.version();
         let statistics = match &mut self.basis {
+            Some((statistics, _)) if *changes < FEW as u64 => statistics,
             Some((statistics, looked)) if *looked == version => statistics,
             Some((statistics, looked)) => {
+                *changes = 0;
                 *looked = version;
                 let now = Statistics::of(host, &self.query)?;
                 if now.drifted(statistics) {

@@ -4,7 +4,7 @@
 //! version of a graph whose schema has not changed.
 
 use super::domain::Domain;
-use super::evaluate::{Environment, node};
+use super::environment::{Environment, SEARCH_LIMIT, node};
 use super::program::{Compiler, Link, Slot, Term, Test};
 use super::{MatchError, conjuncts};
 use crate::{Binding, Comparison, Condition, Grammar, Name, PatternEdge, PatternNode, Rule};
@@ -64,7 +64,7 @@ impl Query {
         rule: &str,
         binding: &Binding,
     ) -> Result<Problem, MatchError> {
-        let mut environment = vec![Slot::Unbound; self.slots];
+        let mut environment = Environment::new(self.slots, SEARCH_LIMIT);
         for (variable, node) in binding.iter() {
             let Some(slot) = self.variables.iter().position(|known| known == variable) else {
                 let known = self.variables.iter().map(Name::as_str);

@@ -3,15 +3,16 @@
 //! Guarantee: every match comes exactly once, in an order that the graph and the plan alone
 //! determine; matches are injective.
 
-use super::candidates::Candidates;
-use super::evaluate::{Environment, is_there, node};
+use super::MatchError;
+use super::candidates::{Candidate, Candidates};
+use super::environment::{Environment, Interrupt, node};
 use super::host::Host;
-use super::plan::{Plan, Source, plan};
-use super::program::Slot;
+use super::plan::{Plan, Source, Step, plan};
+use super::program::{Link, Slot};
 use super::query::{Problem, Query};
 use super::statistics::Statistics;
 use crate::Binding;
-use dsr::{NodeId, ReadError, Snapshot};
+use dsr::{NodeId, ReadError, Snapshot, TypeId};
 use std::fmt;
 use std::sync::Arc;
 
@@ -21,6 +22,8 @@ pub(crate) struct Search<'h, H: Host> {
     host: &'h H,
     problem: Problem,
     plan: Arc<Plan>,
+    /// By slot, the nodes that were looked up.
+    nodes: Vec<Option<H::Node<'h>>>,
     levels: Vec<Candidates<'h, H>>,
     /// By step, how many candidates there were, and how many of them passed.
     seen: Vec<[u64; 2]>,
@@ -39,6 +42,7 @@ impl<'h, H: Host> Search<'h, H> {
     pub(crate) fn new(host: &'h H, problem: Problem, plan: Arc<Plan>) -> Self {
         Self {
             host,
+            nodes: vec![None; problem.query.variables.len()],
             problem,
             levels: Vec::with_capacity(plan.steps.len()),
             seen: vec![[0; 2]; plan.steps.len()],
@@ -47,17 +51,9 @@ impl<'h, H: Host> Search<'h, H> {
         }
     }
 
-    fn frame(&self) -> Frame<'h, '_, H> {
-        Frame {
-            host: self.host,
-            query: &self.problem.query,
-            plan: &self.plan,
-        }
-    }
-
     /// Goes to the next match; `false` where there is none. After that, and after an error, there
     /// is none any more.
-    pub(crate) fn advance(&mut self) -> Result<bool, ReadError> {
+    pub(crate) fn advance(&mut self) -> Result<bool, Interrupt> {
         let found = self.try_advance();
         if !matches!(found, Ok(true)) {
             self.state = State::Done;
@@ -65,60 +61,52 @@ impl<'h, H: Host> Search<'h, H> {
         found
     }
 
-    fn try_advance(&mut self) -> Result<bool, ReadError> {
-        match self.state {
+    fn try_advance(&mut self) -> Result<bool, Interrupt> {
+        let Self {
+            host,
+            problem: Problem { query, environment },
+            plan,
+            nodes,
+            levels,
+            seen,
+            state,
+        } = self;
+        let frame = Frame {
+            host: *host,
+            query,
+            plan,
+        };
+        environment.renew();
+        let mut slots = Slots { environment, nodes };
+        match state {
             State::Done => return Ok(false),
             State::Running => {}
             State::Fresh => {
-                self.state = State::Running;
-                let Self {
-                    host,
-                    problem: Problem { query, environment },
-                    plan,
-                    ..
-                } = self;
-                let frame = Frame {
-                    host: *host,
-                    query,
-                    plan,
-                };
-                if !frame.given_holds(environment)? {
+                *state = State::Running;
+                if !frame.given_holds(&mut slots)? {
                     return Ok(false);
                 }
-                if self.plan.steps.is_empty() {
+                if plan.steps.is_empty() {
                     return Ok(true);
                 }
-                let first = self.frame().candidates(0, &self.problem.environment)?;
-                self.levels.push(first);
+                levels.push(frame.candidates(0, &mut slots)?);
             }
         }
-        while let Some(depth) = self.levels.len().checked_sub(1) {
-            let Some(candidate) = self.levels[depth].next() else {
-                self.levels.pop();
+        while let Some(depth) = levels.len().checked_sub(1) {
+            let Some(candidate) = levels[depth].next() else {
+                levels.pop();
                 continue;
             };
-            self.seen[depth][0] += 1;
-            let Self {
-                host,
-                problem: Problem { query, environment },
-                plan,
-                ..
-            } = self;
-            let frame = Frame {
-                host: *host,
-                query,
-                plan,
-            };
-            if !frame.accept(depth, candidate?, environment)? {
+            slots.environment.spend()?;
+            seen[depth][0] += 1;
+            if !frame.accept(depth, candidate?, &mut slots)? {
                 continue;
             }
-            self.seen[depth][1] += 1;
-            if depth + 1 == self.plan.steps.len() {
+            seen[depth][1] += 1;
+            if depth + 1 == plan.steps.len() {
                 return Ok(true);
             }
-            let environment = &self.problem.environment;
-            let next = self.frame().candidates(depth + 1, environment)?;
-            self.levels.push(next);
+            levels.push(frame.candidates(depth + 1, &mut slots)?);
         }
         Ok(false)
     }
@@ -140,6 +128,49 @@ impl<'h, H: Host> Search<'h, H> {
     }
 }
 
+/// What the slots of a search stand for, and those of the nodes in them that were looked up.
+pub(crate) struct Slots<'s, 'h, H: Host + 'h> {
+    pub(crate) environment: &'s mut Environment,
+    /// By slot of a variable.
+    pub(crate) nodes: &'s mut [Option<H::Node<'h>>],
+}
+
+impl<'h, H: Host> Slots<'_, 'h, H> {
+    fn put(&mut self, slot: usize, id: NodeId) {
+        self.environment[slot] = Slot::Node(id);
+        self.nodes[slot] = None;
+    }
+
+    /// The node in a slot, looked up once.
+    fn node(&mut self, host: &'h H, slot: usize) -> Result<Option<H::Node<'h>>, ReadError> {
+        if self.nodes[slot].is_none()
+            && let Some(id) = node(self.environment, slot)
+        {
+            self.nodes[slot] = host.find(id)?;
+        }
+        Ok(self.nodes[slot])
+    }
+
+    /// Whether the link is in the graph.
+    fn joined(&mut self, host: &'h H, link: &Link) -> Result<bool, ReadError> {
+        let (Some(from), Some(label), Some(to)) = (
+            node(self.environment, link.from),
+            link.label,
+            node(self.environment, link.to),
+        ) else {
+            return Ok(false);
+        };
+        // Either end knows; that which was looked up before costs less.
+        if let (None, Some(to)) = (self.nodes[link.from], self.nodes[link.to]) {
+            return host.has_source(to, label, from);
+        }
+        match self.node(host, link.from)? {
+            Some(from) => host.has_target(from, label, to),
+            None => Ok(false),
+        }
+    }
+}
+
 /// What a search goes by.
 pub(crate) struct Frame<'h, 'p, H: Host> {
     pub(crate) host: &'h H,
@@ -149,18 +180,17 @@ pub(crate) struct Frame<'h, 'p, H: Host> {
 
 impl<'h, H: Host> Frame<'h, '_, H> {
     /// Puts the first match into the slots, those that are given kept.
-    pub(crate) fn first(&self, environment: &mut Environment) -> Result<bool, ReadError> {
-        Ok(self.given_holds(environment)? && self.descend(0, environment)?)
+    pub(crate) fn first(&self, slots: &mut Slots<'_, 'h, H>) -> Result<bool, Interrupt> {
+        Ok(self.given_holds(slots)? && self.descend(0, slots)?)
     }
 
-    fn descend(&self, depth: usize, environment: &mut Environment) -> Result<bool, ReadError> {
+    fn descend(&self, depth: usize, slots: &mut Slots<'_, 'h, H>) -> Result<bool, Interrupt> {
         if depth == self.plan.steps.len() {
             return Ok(true);
         }
-        for candidate in self.candidates(depth, environment)? {
-            if self.accept(depth, candidate?, environment)?
-                && self.descend(depth + 1, environment)?
-            {
+        for candidate in self.candidates(depth, slots)? {
+            slots.environment.spend()?;
+            if self.accept(depth, candidate?, slots)? && self.descend(depth + 1, slots)? {
                 return Ok(true);
             }
         }
@@ -168,32 +198,38 @@ impl<'h, H: Host> Frame<'h, '_, H> {
     }
 
     /// What can be said of the slots that are bound from the start.
-    fn given_holds(&self, environment: &mut Environment) -> Result<bool, ReadError> {
+    fn given_holds(&self, slots: &mut Slots<'_, 'h, H>) -> Result<bool, Interrupt> {
         let Self { host, query, plan } = self;
         for (index, &slot) in plan.given.iter().enumerate() {
-            let others = &plan.given[..index];
-            if others
-                .iter()
-                .any(|&other| environment[other] == environment[slot])
-            {
+            let taken = slots.environment[slot];
+            let mut others = plan.given[..index].iter();
+            if others.any(|&other| slots.environment[other] == taken) {
                 return Ok(false);
             }
-            let Some(id) = node(environment, slot) else {
-                return Ok(false);
-            };
-            let exact = host.type_of(id)?;
+            slots.nodes[slot] = None;
+            let exact = slots.node(host, slot)?.map(|node| host.type_of(node));
             if !exact.is_some_and(|exact| query.domains[slot].contains(exact)) {
                 return Ok(false);
             }
         }
-        for &link in &plan.links {
-            let link = &query.links[link];
-            if is_there(*host, link, environment)? == link.negated {
+        self.passes(&plan.links, &plan.tests, slots)
+    }
+
+    /// Whether these links and conditions hold.
+    fn passes(
+        &self,
+        links: &[usize],
+        tests: &[usize],
+        slots: &mut Slots<'_, 'h, H>,
+    ) -> Result<bool, Interrupt> {
+        for &link in links {
+            let link = &self.query.links[link];
+            if slots.joined(self.host, link)? == link.negated {
                 return Ok(false);
             }
         }
-        for &test in &plan.tests {
-            if !query.tests[test].holds(*host, environment)? {
+        for &test in tests {
+            if !self.query.tests[test].holds(self.host, slots.environment)? {
                 return Ok(false);
             }
         }
@@ -203,95 +239,80 @@ impl<'h, H: Host> Frame<'h, '_, H> {
     fn candidates(
         &self,
         depth: usize,
-        environment: &[Slot],
+        slots: &mut Slots<'_, 'h, H>,
     ) -> Result<Candidates<'h, H>, ReadError> {
         let Self { host, query, .. } = *self;
-        let ids = match self.plan.steps[depth].source {
-            Source::Nodes { slot } => {
-                return Ok(Candidates::members(host, query.domains[slot].types()));
-            }
-            Source::Edges { link } => {
-                let label = query.links[link].label;
-                return Ok(label.map_or(Candidates::Nothing, |label| {
-                    Candidates::Edges(host.edges(label))
-                }));
-            }
-            Source::Values { bound } => {
-                let bound = &query.bounds[bound];
-                Some(host.by_value(bound.attribute, &bound.range))
-            }
+        Ok(match self.plan.steps[depth].source {
             Source::Out { link } => {
-                let link = query.links[link];
-                match (node(environment, link.from), link.label) {
-                    (Some(from), Some(label)) => host.targets(from, label)?,
-                    _ => None,
+                let Link { from, label, .. } = query.links[link];
+                match (slots.node(host, from)?, label) {
+                    (Some(from), Some(label)) => Candidates::Ends(host.targets(from, label)),
+                    _ => Candidates::Nothing,
                 }
             }
             Source::In { link } => {
-                let link = query.links[link];
-                match (node(environment, link.to), link.label) {
-                    (Some(to), Some(label)) => host.sources(to, label)?,
-                    _ => None,
+                let Link { to, label, .. } = query.links[link];
+                match (slots.node(host, to)?, label) {
+                    (Some(to), Some(label)) => Candidates::Ends(host.sources(to, label)),
+                    _ => Candidates::Nothing,
                 }
             }
-        };
-        Ok(ids.map_or(Candidates::Nothing, Candidates::Ids))
+            Source::Nodes { slot } => Candidates::members(host, query.domains[slot].types()),
+            Source::Edges { link } => match query.links[link].label {
+                Some(label) => Candidates::Edges(host.edges(label)),
+                None => Candidates::Nothing,
+            },
+            Source::Values { bound } => {
+                let bound = &query.bounds[bound];
+                Candidates::Indexed(host, host.by_value(bound.attribute, &bound.range))
+            }
+        })
     }
 
     /// Puts a candidate into its slots and tests what can be tested now.
     fn accept(
         &self,
         depth: usize,
-        (first, second): (NodeId, Option<NodeId>),
-        environment: &mut Environment,
-    ) -> Result<bool, ReadError> {
-        let Self { host, query, plan } = self;
-        let step = &plan.steps[depth];
-        if second == Some(first) {
-            return Ok(false);
-        }
-        for (index, id) in [Some(first), second].into_iter().enumerate() {
-            let (Some(slot), Some(id)) = (step.binds[index], id) else {
-                continue;
-            };
-            let taken = Slot::Node(id);
-            if step.others[index]
-                .iter()
-                .any(|&other| environment[other] == taken)
-            {
-                return Ok(false);
+        candidate: Candidate,
+        slots: &mut Slots<'_, 'h, H>,
+    ) -> Result<bool, Interrupt> {
+        let step = &self.plan.steps[depth];
+        let fits = match candidate {
+            Candidate::Node(id, exact) => self.bind(step, 0, (id, exact), slots),
+            Candidate::Edge(key, [from, to]) => {
+                key.from != key.to
+                    && self.bind(step, 0, (key.from, from), slots)
+                    && self.bind(step, 1, (key.to, to), slots)
             }
-            environment[slot] = taken;
+        };
+        Ok(fits && self.passes(&step.links, &step.tests, slots)?)
+    }
+
+    /// Puts a node into one of a step's slots, unless its type is wrong or another slot has it.
+    fn bind(
+        &self,
+        step: &Step,
+        index: usize,
+        (id, exact): (NodeId, TypeId),
+        slots: &mut Slots<'_, 'h, H>,
+    ) -> bool {
+        let Some(slot) = step.binds[index] else {
+            return true;
+        };
+        let taken = Slot::Node(id);
+        let mut others = step.others[index].iter();
+        let free = self.query.domains[slot].contains(exact)
+            && !others.any(|&other| slots.environment[other] == taken);
+        if free {
+            slots.put(slot, id);
         }
-        if step.typed {
-            for (slot, id) in step.binds.iter().zip([Some(first), second]) {
-                if let (Some(slot), Some(id)) = (slot, id)
-                    && !host
-                        .type_of(id)?
-                        .is_some_and(|exact| query.domains[*slot].contains(exact))
-                {
-                    return Ok(false);
-                }
-            }
-        }
-        for &link in &step.links {
-            let link = &query.links[link];
-            if is_there(*host, link, environment)? == link.negated {
-                return Ok(false);
-            }
-        }
-        for &test in &step.tests {
-            if !query.tests[test].holds(*host, environment)? {
-                return Ok(false);
-            }
-        }
-        Ok(true)
+        free
     }
 }
 
 /// The matches of a rule or goal, found one at a time.
 ///
-/// Ends after the first [`ReadError`] (a snapshot that became too old, say).
+/// Ends after the first error: a snapshot that became too old, or a search without end.
 pub struct Matches<'a> {
     search: Search<'a, Snapshot>,
 }
@@ -318,11 +339,19 @@ impl<'a> Matches<'a> {
         }
     }
 
+    /// The same, but giving up where so many nodes were tried from one match to the next, in place
+    /// of [`SEARCH_LIMIT`](crate::SEARCH_LIMIT).
+    #[must_use]
+    pub fn within(mut self, limit: u64) -> Self {
+        self.search.problem.environment.set_limit(limit);
+        self
+    }
+
     /// Counts the matches that are left.
     ///
     /// # Errors
-    /// [`ReadError`], which ends the search.
-    pub fn count_all(mut self) -> Result<u64, ReadError> {
+    /// [`MatchError`], which ends the search.
+    pub fn count_all(mut self) -> Result<u64, MatchError> {
         let mut count = 0;
         while self.search.advance()? {
             count += 1;
@@ -342,13 +371,13 @@ impl<'a> Matches<'a> {
 }
 
 impl Iterator for Matches<'_> {
-    type Item = Result<Binding, ReadError>;
+    type Item = Result<Binding, MatchError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         match self.search.advance() {
             Ok(true) => Some(Ok(self.search.binding())),
             Ok(false) => None,
-            Err(error) => Some(Err(error)),
+            Err(interrupt) => Some(Err(interrupt.into())),
         }
     }
 }

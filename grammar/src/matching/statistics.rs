@@ -9,7 +9,7 @@ use dsr::ReadError;
 /// No more nodes than this are counted in a range of an index.
 const COUNTED: usize = 1000;
 /// Counts below this are all alike: no plan is so bad that it matters.
-const FEW: f64 = 16.0;
+pub(super) const FEW: f64 = 16.0;
 
 /// How many candidates there are for what a query names.
 #[derive(Debug, Clone, PartialEq)]

@@ -41,7 +41,58 @@ fn bound(snapshot: &Snapshot, assignment: &Assignment) -> Binding {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(2000))]
+    #![proptest_config(crate::testing::cases(300))]
+
+    #[test]
+    fn a_limit_ends_a_search_and_changes_no_match(
+        model in Model::strategy(),
+        rule in FEW.rule(),
+        limit in 0..200_u64,
+    ) {
+        let grammar = grammar_of(rule);
+        let graph = model.to_graph();
+        let snapshot = graph.snapshot();
+        let search = || grammar.matches(&snapshot, &grammar.rules[0], &Binding::new()).unwrap();
+        let all: Vec<Binding> = search().map(Result::unwrap).collect();
+        let mut within: Vec<Result<Binding, MatchError>> = search().within(limit).collect();
+        if within.last().is_some_and(Result::is_err) {
+            prop_assert_eq!(within.pop(), Some(Err(MatchError::Limit { limit })));
+        } else {
+            prop_assert_eq!(within.len(), all.len());
+        }
+        for (found, expected) in within.iter().zip(&all) {
+            prop_assert_eq!(found.as_ref(), Ok(expected));
+        }
+    }
+}
+
+#[test]
+fn quantifiers_within_quantifiers_are_given_up() {
+    let nodes: Vec<String> = (0..40).map(|index| format!("n{index}")).collect();
+    let nodes: Vec<(&str, &str)> = nodes.iter().map(|name| ("t", name.as_str())).collect();
+    let many = graph(&nodes, &[]);
+    let snapshot = many.snapshot();
+    let never = "(and (= x y) (not (= x y)))";
+    for condition in [
+        format!("(exists u:t v:t w:t (exists x:t y:t z:t {never}))"),
+        format!("(forall u:t v:t (exists w:t (forall x:t y:t z:t (not {never}))))"),
+        format!("(not (forall u:t v:t w:t (not (exists x:t y:t z:t {never}))))"),
+    ] {
+        let grammar = rule(&format!("{{ }} => {{ }} precondition {{ {condition} }}"));
+        let rule = grammar.rule("r").unwrap();
+        let mut matches = grammar.matches(&snapshot, rule, &Binding::new()).unwrap();
+        let given_up = MatchError::Limit { limit: 1000 };
+        matches = matches.within(1000);
+        assert_eq!(matches.next(), Some(Err(given_up)), "{condition}");
+        assert_eq!(matches.next(), None);
+        let obstacle = grammar.obstacle(&snapshot, rule, &Binding::new());
+        let limit = crate::CHOICE_LIMIT;
+        assert_eq!(obstacle, Err(MatchError::Limit { limit }), "{condition}");
+    }
+}
+
+proptest! {
+    #![proptest_config(crate::testing::cases(2000))]
 
     #[test]
     fn matches_are_those_of_brute_force(model in Model::strategy(), rule in FEW.rule()) {

@@ -29,7 +29,7 @@ fn of_working(graph: &WorkingGraph) -> Content {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(1000))]
+    #![proptest_config(crate::testing::cases(1000))]
 
     #[test]
     fn a_step_in_memory_is_what_a_commit_does(model in Model::strategy(), rule in FEW.rule()) {

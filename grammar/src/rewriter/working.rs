@@ -199,9 +199,23 @@ impl WorkingGraph {
     }
 }
 
+/// Nodes at the other ends of edges.
+pub(crate) struct Ends<'a> {
+    graph: &'a WorkingGraph,
+    ends: std::slice::Iter<'a, (LabelId, NodeId)>,
+}
+
+impl Iterator for Ends<'_> {
+    type Item = Result<(NodeId, TypeId), ReadError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let &(_, node) = self.ends.next()?;
+        Some(Ok((node, self.graph.type_of(node))))
+    }
+}
+
 /// Ids of nodes of a working graph.
 pub(crate) enum Ids<'a> {
-    Ends(std::slice::Iter<'a, (LabelId, NodeId)>),
     Members(std::collections::btree_set::Iter<'a, NodeId>),
     Base(NodeIds<'a>),
     Nothing,
@@ -212,7 +226,6 @@ impl Iterator for Ids<'_> {
 
     fn next(&mut self) -> Option<Self::Item> {
         match self {
-            Self::Ends(ends) => ends.next().map(|&(_, node)| Ok(node)),
             Self::Members(nodes) => nodes.next().map(|&node| Ok(node)),
             Self::Base(ids) => ids.next(),
             Self::Nothing => None,
@@ -221,28 +234,40 @@ impl Iterator for Ids<'_> {
 }
 
 impl Host for WorkingGraph {
+    /// The id of one that is there.
+    type Node<'a> = NodeId;
     type Ids<'a> = Ids<'a>;
-    type Edges<'a> = Box<dyn Iterator<Item = Result<EdgeKey, ReadError>> + 'a>;
+    type Ends<'a> = Ends<'a>;
+    type Edges<'a> = Box<dyn Iterator<Item = Result<(EdgeKey, [TypeId; 2]), ReadError>> + 'a>;
 
     fn version(&self) -> Version {
         self.base.version()
     }
 
-    fn type_of(&self, node: NodeId) -> Result<Option<TypeId>, ReadError> {
-        Ok(self.entry(node).map(|entry| entry.exact))
+    fn find(&self, id: NodeId) -> Result<Option<NodeId>, ReadError> {
+        Ok(self.entry(id).map(|_| id))
     }
 
-    fn has_edge(&self, key: EdgeKey) -> Result<bool, ReadError> {
-        let end = (key.label, key.to);
-        let from = self.entry(key.from);
-        Ok(from.is_some_and(|from| from.out.binary_search(&end).is_ok()))
+    fn type_of(&self, node: NodeId) -> TypeId {
+        self.entry(node)
+            .map_or(TypeId(u16::MAX), |entry| entry.exact)
+    }
+
+    fn has_target(&self, from: NodeId, label: LabelId, to: NodeId) -> Result<bool, ReadError> {
+        let from = self.entry(from);
+        Ok(from.is_some_and(|from| from.out.binary_search(&(label, to)).is_ok()))
+    }
+
+    fn has_source(&self, to: NodeId, label: LabelId, from: NodeId) -> Result<bool, ReadError> {
+        let to = self.entry(to);
+        Ok(to.is_some_and(|to| to.into.binary_search(&(label, from)).is_ok()))
     }
 
     fn node_value(&self, node: NodeId, attribute: AttributeId) -> Result<Option<Value>, ReadError> {
-        if self.entry(node).is_none() {
-            return Ok(None);
+        match self.base.find_node(node)? {
+            Some(node) => self.base.node_value(node, attribute),
+            None => Ok(None),
         }
-        Host::node_value(&self.base, node, attribute)
     }
 
     fn edge_value(&self, key: EdgeKey, attribute: AttributeId) -> Result<Option<Value>, ReadError> {
@@ -252,14 +277,20 @@ impl Host for WorkingGraph {
         Host::edge_value(&self.base, key, attribute)
     }
 
-    fn targets(&self, from: NodeId, label: LabelId) -> Result<Option<Ids<'_>>, ReadError> {
-        let from = self.entry(from);
-        Ok(from.map(|from| Ids::Ends(labelled(&from.out, label).iter())))
+    fn targets(&self, from: NodeId, label: LabelId) -> Ends<'_> {
+        let ends = self.entry(from).map_or(&[][..], |from| &from.out);
+        Ends {
+            graph: self,
+            ends: labelled(ends, label).iter(),
+        }
     }
 
-    fn sources(&self, to: NodeId, label: LabelId) -> Result<Option<Ids<'_>>, ReadError> {
-        let to = self.entry(to);
-        Ok(to.map(|to| Ids::Ends(labelled(&to.into, label).iter())))
+    fn sources(&self, to: NodeId, label: LabelId) -> Ends<'_> {
+        let ends = self.entry(to).map_or(&[][..], |to| &to.into);
+        Ends {
+            graph: self,
+            ends: labelled(ends, label).iter(),
+        }
     }
 
     fn members(&self, exact: TypeId) -> Ids<'_> {
@@ -268,7 +299,8 @@ impl Host for WorkingGraph {
     }
 
     fn edges(&self, label: LabelId) -> Self::Edges<'_> {
-        Box::new(self.edges().filter(move |key| key.label == label).map(Ok))
+        let edges = self.edges().filter(move |key| key.label == label);
+        Box::new(edges.map(|key| Ok((key, [key.from, key.to].map(|end| self.type_of(end))))))
     }
 
     fn by_value(&self, attribute: AttributeId, range: &ValueRange) -> Ids<'_> {

@@ -177,7 +177,7 @@ fn permutations(length: usize, chosen: &mut Vec<usize>, visit: &mut impl FnMut(&
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(400))]
+    #![proptest_config(crate::testing::cases(400))]
 
     #[test]
     fn an_unfolded_combo_does_what_its_steps_do(

@@ -1,7 +1,7 @@
 //! `cortex rules apply`: what a rule changes. In a file's world it is only tried, on a graph of this
 //! process; in a running system the store applies it.
 
-use super::{Names, World, find_rule, load, words};
+use super::{Names, World, find_rule, load, unmatched, words};
 use crate::cli::WorldArgs;
 use crate::commands::graph::no_such;
 use crate::commands::output::{print, print_json};
@@ -46,17 +46,12 @@ fn the_match(
     let found = grammar
         .matches(snapshot, rule, given)
         .map_err(Failure::input)?;
-    let found: Vec<Binding> = found
-        .take(2)
-        .collect::<Result<_, _>>()
-        .map_err(Failure::internal)?;
+    let found: Vec<Binding> = found.take(2).collect::<Result<_, _>>().map_err(unmatched)?;
     let all_given = given.len() == rule.bound_nodes().count();
     match &found[..] {
         [one] => Ok(Ok(one.clone())),
         [] if all_given => {
-            let why = grammar
-                .obstacle(snapshot, rule, given)
-                .map_err(Failure::internal)?;
+            let why = grammar.obstacle(snapshot, rule, given).map_err(unmatched)?;
             Ok(Err(why.map_or_else(String::new, |why| why.to_string())))
         }
         [] if given.is_empty() => Ok(Err("its left-hand side holds nowhere".to_owned())),
@@ -145,7 +140,7 @@ fn operations(
 ) -> Result<Result<Vec<Operation>, String>, Failure> {
     match grammar.apply(snapshot, &rule.name, binding) {
         Ok(operations) => Ok(Ok(operations)),
-        Err(ApplyError::Match(error)) => Err(Failure::internal(error)),
+        Err(ApplyError::Match(error)) => Err(unmatched(error)),
         Err(refused) => Ok(Err(refused.to_string())),
     }
 }

@@ -1,6 +1,6 @@
 //! `cortex rules explain`: in which order a rule's nodes are looked for, and what that comes to.
 
-use super::{find_rule, load};
+use super::{find_rule, load, unmatched};
 use crate::commands::graph::read_graph;
 use crate::commands::output::{print, print_json};
 use crate::{Answer, Failure};
@@ -26,7 +26,7 @@ pub(super) fn explain(
         .iter()
         .map(|rule| grammar.search_plan(snapshot.as_ref(), rule, &Binding::new()))
         .collect::<Result<Vec<_>, _>>()
-        .map_err(Failure::internal)?;
+        .map_err(unmatched)?;
     if as_json {
         let mut rows: Vec<Json> = plans.iter().map(plan_json).collect();
         // Asked for one rule, the answer is of one rule.

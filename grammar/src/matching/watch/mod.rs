@@ -7,10 +7,12 @@ mod set;
 mod trigger;
 
 use super::MatchError;
+use super::environment::{Environment, Interrupt, SEARCH_LIMIT};
+use super::plan::Plan;
 use super::planned::Planned;
 use super::program::Slot;
 use super::query::Problem;
-use super::search::{Frame, Search};
+use super::search::{Frame, Search, Slots};
 use crate::{Binding, Grammar, Name, Rule};
 use dsr::{
     Change, EdgeChange, Epoch, LabelId, NodeChange, NodeId, ReadError, Schema, Snapshot, Touch,
@@ -19,7 +21,7 @@ use dsr::{
 use set::{MatchSet, Row, Seed};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
-use trigger::{Anchor, EdgeTrigger, NodeTrigger, Seeds, Triggers, When};
+use trigger::{Anchor, Can, EdgeTrigger, NodeTrigger, Seeds, Triggers, When};
 
 /// The matches of some rules, kept up to date from the changes of a graph.
 ///
@@ -70,6 +72,8 @@ pub struct Watch {
 #[derive(Debug)]
 struct Pattern {
     planned: Planned,
+    /// How many nodes and edges have changed since the plans were last compared with the graph.
+    changes: u64,
     set: MatchSet,
 }
 
@@ -91,8 +95,9 @@ pub struct MatchDelta {
     pub removed: Vec<RuleMatch>,
 }
 
-/// What a change can do to partial matches: make new matches of them, break old ones.
-type Touched = BTreeMap<(usize, Seed), [bool; 2]>;
+/// What a change can do to partial matches.
+type Touched = BTreeMap<(usize, Seed), Can>;
+
 /// By pattern, new and gone matches.
 type Rows = BTreeMap<usize, [BTreeSet<Row>; 2]>;
 
@@ -151,6 +156,7 @@ impl Watch {
             self.nodes.extend(nodes.map(|trigger| (index, trigger)));
             self.patterns.push(Pattern {
                 planned: Planned::new(query),
+                changes: 0,
                 set: MatchSet::default(),
             });
         }
@@ -283,7 +289,11 @@ impl Watch {
         delta
     }
 
-    fn take_in(&mut self, change: &Change, snapshot: &Snapshot) -> Result<Rows, ReadError> {
+    fn take_in(&mut self, change: &Change, snapshot: &Snapshot) -> Result<Rows, Interrupt> {
+        let count = (change.edges.len() + change.nodes.len()) as u64;
+        for pattern in &mut self.patterns {
+            pattern.changes = pattern.changes.saturating_add(count);
+        }
         let mut touched = Touched::new();
         let mut afresh = BTreeSet::new();
         for edge in &change.edges {
@@ -294,23 +304,23 @@ impl Watch {
         }
         let mut rows = Rows::new();
         for index in &afresh {
-            touched.insert((*index, Seed::new()), [true, true]);
+            touched.insert((*index, Seed::new()), Can::EITHER);
         }
-        for ((index, seed), [makes, breaks]) in touched {
+        for ((index, seed), can) in touched {
             if afresh.contains(&index) && !seed.is_empty() {
                 continue;
             }
             let pattern = &mut self.patterns[index];
             let [added, removed] = rows.entry(index).or_default();
-            if breaks {
+            if can.break_some || can.break_all {
                 for row in pattern.set.extending(&seed) {
-                    if !pattern.holds(snapshot, &row)? {
+                    if can.break_all || !pattern.holds(snapshot, &row)? {
                         pattern.set.remove(&row);
                         removed.insert(row);
                     }
                 }
             }
-            if makes {
+            if can.make {
                 for row in pattern.search(snapshot, &seed)? {
                     if pattern.set.insert(&row) {
                         added.insert(row);
@@ -345,6 +355,7 @@ impl Watch {
                 }
                 Touch::Replaced => (trigger.attribute.is_some(), trigger.attribute.is_some()),
             };
+            let gone = edge.touch == Touch::Deleted && trigger.is_link();
             let fits = |anchor: &Anchor, exact: Option<TypeId>| match anchor {
                 Anchor::Slot(slot) => {
                     let domain = &self.patterns[*index].planned.query().domains[*slot];
@@ -355,7 +366,12 @@ impl Watch {
             let makes = makes && fits(&trigger.from, from) && fits(&trigger.to, to);
             if makes || breaks {
                 let seeds = trigger.seeds(snapshot, key.from, key.to)?;
-                note(*index, seeds, [makes, breaks], touched, afresh);
+                let can = Can {
+                    make: makes,
+                    break_some: breaks && !gone,
+                    break_all: breaks && gone,
+                };
+                note(*index, seeds, can, touched, afresh);
             }
         }
         Ok(())
@@ -378,7 +394,11 @@ impl Watch {
                 // Once per slot: each has one trigger of another sort than attributes.
                 if !matches!(trigger.when, When::Attribute(_)) {
                     let seeds = Seeds::These(vec![vec![(slot, node.node)]]);
-                    note(*index, seeds, [false, true], touched, afresh);
+                    let can = Can {
+                        break_all: true,
+                        ..Can::default()
+                    };
+                    note(*index, seeds, can, touched, afresh);
                 }
                 continue;
             }
@@ -393,35 +413,27 @@ impl Watch {
             };
             if fires {
                 let seeds = trigger.anchor.seeds(snapshot, node.node)?;
-                note(*index, seeds, [true, true], touched, afresh);
+                note(*index, seeds, Can::EITHER, touched, afresh);
             }
         }
         Ok(())
     }
 }
 
-fn note(
-    index: usize,
-    seeds: Seeds,
-    [makes, breaks]: [bool; 2],
-    touched: &mut Touched,
-    afresh: &mut BTreeSet<usize>,
-) {
+fn note(index: usize, seeds: Seeds, can: Can, touched: &mut Touched, afresh: &mut BTreeSet<usize>) {
     let Seeds::These(seeds) = seeds else {
         afresh.insert(index);
         return;
     };
     for seed in seeds {
-        let known = touched.entry((index, seed)).or_default();
-        known[0] |= makes;
-        known[1] |= breaks;
+        touched.entry((index, seed)).or_default().add(can);
     }
 }
 
 impl Pattern {
     fn at(&self, seed: impl Iterator<Item = (usize, NodeId)>) -> Problem {
         let query = self.planned.query();
-        let mut environment = vec![Slot::Unbound; query.slots];
+        let mut environment = Environment::new(query.slots, SEARCH_LIMIT);
         for (slot, node) in seed {
             environment[slot] = Slot::Node(node);
         }
@@ -431,11 +443,16 @@ impl Pattern {
         }
     }
 
+    /// The plan for a search with these slots given.
+    fn plan(&mut self, snapshot: &Snapshot, given: &[usize]) -> Result<Arc<Plan>, ReadError> {
+        self.planned.plan_after(&mut self.changes, snapshot, given)
+    }
+
     /// The matches that bind these slots so.
-    fn search(&mut self, snapshot: &Snapshot, seed: &Seed) -> Result<Vec<Row>, ReadError> {
+    fn search(&mut self, snapshot: &Snapshot, seed: &Seed) -> Result<Vec<Row>, Interrupt> {
         let problem = self.at(seed.iter().copied());
         let given: Vec<usize> = seed.iter().map(|(slot, _)| *slot).collect();
-        let plan = self.planned.plan(snapshot, &given)?;
+        let plan = self.plan(snapshot, &given)?;
         let mut search = Search::new(snapshot, problem, plan);
         let mut rows = Vec::new();
         while search.advance()? {
@@ -445,16 +462,19 @@ impl Pattern {
     }
 
     /// Whether a match still holds.
-    fn holds(&mut self, snapshot: &Snapshot, row: &Row) -> Result<bool, ReadError> {
+    fn holds(&mut self, snapshot: &Snapshot, row: &Row) -> Result<bool, Interrupt> {
         let mut problem = self.at(row.iter().copied().enumerate());
         let given: Vec<usize> = (0..row.len()).collect();
-        let plan = self.planned.plan(snapshot, &given)?;
+        let plan = self.plan(snapshot, &given)?;
         let frame = Frame {
             host: snapshot,
             query: &problem.query,
             plan: &plan,
         };
-        frame.first(&mut problem.environment)
+        frame.first(&mut Slots {
+            environment: &mut problem.environment,
+            nodes: &mut vec![None; problem.query.variables.len()],
+        })
     }
 }
 

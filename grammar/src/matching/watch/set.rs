@@ -4,7 +4,7 @@
 //! node are found without looking at others.
 
 use dsr::NodeId;
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -16,7 +16,8 @@ pub(super) type Seed = Vec<(usize, NodeId)>;
 #[derive(Debug, Default)]
 pub(super) struct MatchSet {
     rows: BTreeSet<Row>,
-    by_node: FxHashMap<(usize, NodeId), BTreeSet<Row>>,
+    /// In no order: whoever asks puts what comes of it into one.
+    by_node: FxHashMap<(usize, NodeId), FxHashSet<Row>>,
 }
 
 impl MatchSet {
@@ -50,7 +51,7 @@ impl MatchSet {
 
     /// The matches that bind all of these slots so.
     pub(super) fn extending(&self, seed: &Seed) -> Vec<Row> {
-        let mut fewest: Option<&BTreeSet<Row>> = None;
+        let mut fewest: Option<&FxHashSet<Row>> = None;
         for &(slot, node) in seed {
             let Some(rows) = self.by_node.get(&(slot, node)) else {
                 return Vec::new();
@@ -60,7 +61,9 @@ impl MatchSet {
             }
         }
         let fits = |row: &&Row| seed.iter().all(|&(slot, node)| row[slot] == node);
-        let rows = fewest.unwrap_or(&self.rows).iter().filter(fits);
-        rows.cloned().collect()
+        match fewest {
+            Some(rows) => rows.iter().filter(fits).cloned().collect(),
+            None => self.rows.iter().cloned().collect(),
+        }
     }
 }

@@ -129,7 +129,7 @@ fn of_rule(matches: &[RuleMatch], rule: &str) -> BTreeSet<Binding> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(600))]
+    #![proptest_config(crate::testing::cases(600))]
 
     #[test]
     fn a_watch_has_what_a_fresh_search_finds(

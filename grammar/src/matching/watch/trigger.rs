@@ -30,6 +30,29 @@ pub(super) struct Hop {
     outwards: bool,
 }
 
+/// What a change can do to matches that bind some nodes.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Can {
+    pub(super) make: bool,
+    /// Each has to be looked at.
+    pub(super) break_some: bool,
+    /// None is left: a link of theirs is gone.
+    pub(super) break_all: bool,
+}
+impl Can {
+    pub(super) const EITHER: Self = Self {
+        make: true,
+        break_some: true,
+        break_all: false,
+    };
+
+    pub(super) fn add(&mut self, other: Self) {
+        self.make |= other.make;
+        self.break_some |= other.break_some;
+        self.break_all |= other.break_all;
+    }
+}
+
 /// What a changed edge can do.
 #[derive(Debug, Clone)]
 pub(super) struct EdgeTrigger {
@@ -223,14 +246,16 @@ impl Anchor {
         for hop in hops {
             let mut next = BTreeSet::new();
             for &node in &nodes {
-                let Some(label) = hop.label else { continue };
-                let ids = if hop.outwards {
-                    host.targets(node, label)?
-                } else {
-                    host.sources(node, label)?
+                let (Some(label), Some(node)) = (hop.label, host.find(node)?) else {
+                    continue;
                 };
-                for id in ids.into_iter().flatten() {
-                    next.insert(id?);
+                let ends = if hop.outwards {
+                    host.targets(node, label)
+                } else {
+                    host.sources(node, label)
+                };
+                for end in ends {
+                    next.insert(end?.0);
                 }
             }
             nodes = next;
@@ -249,6 +274,12 @@ impl Anchor {
 }
 
 impl EdgeTrigger {
+    /// Whether every match has the edge between the nodes that it binds.
+    pub(super) fn is_link(&self) -> bool {
+        let bound = |anchor: &Anchor| matches!(anchor, Anchor::Slot(_));
+        self.makes && !self.breaks && bound(&self.from) && bound(&self.to)
+    }
+
     /// What an edge between these nodes binds.
     pub(super) fn seeds<H: Host>(
         &self,
