@@ -58,8 +58,16 @@ fn load_scenario(folder: &Path) -> Result<Scenario, Failure> {
 
 /// Reads a text file that the user named.
 pub(crate) fn read_text(path: &Path) -> Result<String, Failure> {
-    std::fs::read_to_string(path)
-        .map_err(|error| Failure::input(format!("cannot read {}: {error}", path.display())))
+    let bytes = std::fs::read(path)
+        .map_err(|error| Failure::input(format!("cannot read {}: {error}", path.display())))?;
+    String::from_utf8(bytes).map_err(|error| {
+        let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = good.split(|byte| *byte == b'\n').count();
+        let (path, place) = (path.display(), good.len() + 1);
+        Failure::input(format!(
+            "{path}:{line}: byte {place} of the file is not UTF-8 text"
+        ))
+    })
 }
 
 /// Reads a grammar with all that it includes, each path relative to the file it stands in, and

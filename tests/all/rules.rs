@@ -158,6 +158,69 @@ fn includes_are_found_beside_the_file_that_names_them_and_each_defect_has_its_pl
 }
 
 #[test]
+fn what_a_manifest_does_not_give_is_told_in_both_files() {
+    let tidy = "name=tidy\n===\nclear : active(1) agent(keeper)\n{ { c:cup t:table c->t(on) } => { t:table } \
+                effect { (assign t.clear true) } }\nmove : active(1) agent(keeper)\n\
+                { { c:cup a:table b:table c->a(on) } => { c:cup a:table b:table c->b(on) } }\n";
+    let manifest = "agent = \"keeper\"\nnodes = [\"cup\"]\nrules = [\"clear\", \"claer\"]\n";
+    let folder = Folder::new(&[("a.aggl", tidy), ("keeper.toml", manifest)]);
+    let path = folder.path("keeper.toml");
+    let (code, _, err) = rules(&folder, "check", "a.aggl", &["--manifest", text(&path)]);
+    assert_eq!(code, 2, "{err}");
+    let of = |file: &str, place: &str| format!("{}:{place}", text(&folder.path(file)));
+    for expected in [
+        of(
+            "a.aggl",
+            "4:24: warning: this removes a link `on`, which the manifest of `keeper` gives only by this rule",
+        ),
+        of(
+            "a.aggl",
+            "5:24: error: the manifest of `keeper` gives no right to apply this rule",
+        ),
+        of("keeper.toml", "3:19: error: no rule `claer`"),
+    ] {
+        assert!(err.contains(&expected), "{expected}\n{err}");
+    }
+    assert!(err.contains("this writes `t.clear`"), "{err}");
+    assert!(!err.contains("deletes a `cup`"), "{err}");
+    let given = manifest.replace(", \"claer\"", ", \"move\"");
+    fs::write(&path, given).unwrap();
+    let (code, _, err) = rules(&folder, "check", "a.aggl", &["--manifest", text(&path)]);
+    assert_eq!(code, 0, "{err}");
+    assert!(err.contains("this makes a link `on`"), "{err}");
+}
+
+#[test]
+fn a_combo_is_listed_with_the_rules_that_it_stands_for() {
+    let combo = "name=two\n===\n\
+                 open : active(1) { { d:door d->d(shut) } => { d:door } }\n\
+                 pass : active(2) { { r:robot d:door d->d(shut)* } => { r:robot d:door r->d(passed) } }\n\
+                 through : active(0) { open as first optional pass as second\n\
+                 where: ( first.d = second.d ) }\n";
+    let folder = Folder::new(&[("a.aggl", combo)]);
+    let (code, out, err) = rules(&folder, "list", "a.aggl", &[]);
+    assert_eq!(code, 0, "{err}");
+    let expected = "combo through : active, cost 0  (open as first optional, pass as second)\n    \
+                    as rule through  ";
+    assert!(out.contains(expected), "{out}");
+    assert!(out.contains("    as rule through_without_first  "), "{out}");
+    let (_, list) = json(&folder, "list", "a.aggl", &[]);
+    let listed = &list["rules"][2];
+    assert_eq!(
+        [&listed["name"], &listed["combo"]],
+        [&json!("through"), &json!(true)]
+    );
+    let names: Vec<&Value> = listed["variants"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|variant| &variant["name"])
+        .collect();
+    assert_eq!(names, ["through", "through_without_first"]);
+    assert_eq!(listed["variants"][1]["steps"], json!(["second"]));
+}
+
+#[test]
 fn a_file_that_is_not_there_is_bad_input() {
     let folder = Folder::new(&[]);
     for verb in ["check", "list", "fmt"] {
@@ -167,6 +230,10 @@ fn a_file_that_is_not_there_is_bad_input() {
             "{verb}: {code} {err}"
         );
     }
+    fs::write(folder.path("latin.aggl"), b"name=caf\xe9\n").unwrap();
+    let (code, _, err) = rules(&folder, "check", "latin.aggl", &[]);
+    let expected = "latin.aggl:1: byte 9 of the file is not UTF-8 text";
+    assert!(code == 2 && err.contains(expected), "{code} {err}");
 }
 
 #[test]

@@ -407,6 +407,7 @@ impl Parser<'_> {
     }
 
     fn equality(&mut self) -> Option<Vec<ComboVariable>> {
+        let bracketed = self.eat("(");
         let mut variables = vec![self.combo_variable()?];
         while self.eat("=") {
             variables.push(self.combo_variable()?);
@@ -414,6 +415,9 @@ impl Parser<'_> {
         if variables.len() < 2 {
             self.expected("`=` and another `alias.variable`", &[]);
             return None;
+        }
+        if bracketed {
+            self.expect(")", "`)`")?;
         }
         Some(variables)
     }

@@ -11,7 +11,10 @@ use super::output::{print, print_json, tell};
 use crate::cli::{Rules as Arguments, RulesAction, WorldArgs};
 use crate::{Answer, Failure};
 use dsr::{Graph, NodeId, Session, Snapshot};
-use grammar::{Binding, Combo, Defects, Diagnostic, Grammar, Problem, Rule, Severity};
+use grammar::{
+    Binding, Combo, ComboStep, Defects, Diagnostic, Grammar, MatchError, Problem, Rule, Severity,
+    Unfolded,
+};
 use serde_json::{Map, Value as Json, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -25,8 +28,16 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
             file,
             schema,
             world,
+            manifest,
             conflicts,
-        } => check::check(file, schema.as_deref(), world.as_deref(), *conflicts, json),
+        } => {
+            let beside = check::Beside {
+                schema: schema.as_deref(),
+                world: world.as_deref(),
+                manifests: manifest,
+            };
+            check::check(file, &beside, *conflicts, json)
+        }
         RulesAction::List { file } => list(file, json),
         RulesAction::Fmt { file } => format(file, json),
         RulesAction::Match {
@@ -107,7 +118,20 @@ fn rule_json(rule: &Rule) -> Json {
     })
 }
 
-fn combo_json(combo: &Combo) -> Json {
+/// The rules that a combo stands for.
+fn variants<'a>(grammar: &'a Grammar, combo: &'a Combo) -> impl Iterator<Item = &'a Unfolded> {
+    let unfolded = grammar.unfolded.iter();
+    unfolded.filter(move |variant| variant.combo == combo.name)
+}
+
+fn combo_json(grammar: &Grammar, combo: &Combo) -> Json {
+    let variant = |variant: &Unfolded| {
+        let steps = variant.steps.iter().map(|step| step.alias.as_str());
+        let mut row = rule_json(&variant.rule);
+        row["steps"] = json!(steps.collect::<Vec<_>>());
+        row
+    };
+    let variants: Vec<Json> = variants(grammar, combo).map(variant).collect();
     let steps: Vec<Json> = combo
         .steps
         .iter()
@@ -120,20 +144,30 @@ fn combo_json(combo: &Combo) -> Json {
         "parameters": [],
         "combo": true,
         "steps": steps,
+        "variants": variants,
     })
+}
+
+/// The variables of a rule with their types.
+fn words_of_nodes(rule: &Rule) -> String {
+    let nodes = rule.bound_nodes();
+    let nodes = nodes.map(|node| format!("{}:{}", node.variable, node.type_name));
+    nodes.collect::<Vec<_>>().join(" ")
 }
 
 fn list(file: &Path, as_json: bool) -> Result<Answer, Failure> {
     let (grammar, diagnostics) = read(file)?;
     if as_json {
         let rules = grammar.rules.iter().map(rule_json);
+        let combos = grammar.combos.iter();
+        let combos = combos.map(|combo| combo_json(&grammar, combo));
         let types = grammar.types.names().chain(grammar.types.undeclared());
         let mut types: Vec<&str> = types.map(|name| &**name).collect();
         let mut seen = BTreeSet::new();
         types.retain(|name| seen.insert(*name));
         print_json(&json!({
             "types": types,
-            "rules": rules.chain(grammar.combos.iter().map(combo_json)).collect::<Vec<_>>(),
+            "rules": rules.chain(combos).collect::<Vec<_>>(),
             "diagnostics": diagnostics_json(&diagnostics),
         }))?;
         return Ok(Answer::Yes);
@@ -155,7 +189,6 @@ fn list(file: &Path, as_json: bool) -> Result<Answer, Failure> {
         let _ = writeln!(text, "type {}{parents}", names(&declaration.names));
     }
     for rule in &grammar.rules {
-        let variables: Vec<String> = rule.bound_nodes().map(ToString::to_string).collect();
         let agent = rule
             .agent
             .as_ref()
@@ -166,17 +199,25 @@ fn list(file: &Path, as_json: bool) -> Result<Answer, Failure> {
             rule.name,
             rule.kind,
             rule.cost,
-            variables.join(" ")
+            words_of_nodes(rule)
         );
     }
     for combo in &grammar.combos {
-        let steps: Vec<&str> = combo.steps.iter().map(|step| &*step.rule).collect();
+        let step = |step: &ComboStep| {
+            let optional = if step.optional { " optional" } else { "" };
+            format!("{} as {}{optional}", step.rule, step.alias)
+        };
+        let steps: Vec<String> = combo.steps.iter().map(step).collect();
         let (name, kind, cost) = (&combo.name, combo.kind, combo.cost);
         let _ = writeln!(
             text,
             "combo {name} : {kind}, cost {cost}  ({})",
             steps.join(", ")
         );
+        for variant in variants(&grammar, combo) {
+            let nodes = words_of_nodes(&variant.rule);
+            let _ = writeln!(text, "    as rule {}  ({nodes})", variant.rule.name);
+        }
     }
     print(&text)?;
     warn(diagnostics);
@@ -307,6 +348,17 @@ fn words(rule: &Rule, named: &Map<String, Json>) -> String {
     pairs.collect::<Vec<_>>().join(" ")
 }
 
+/// Why matching failed: a rule that asks for too much is the user's, all else is not.
+fn unmatched(error: MatchError) -> Failure {
+    match error {
+        MatchError::Limit { .. } => Failure::input_with_help(
+            error.to_string(),
+            "join the nodes of the rule by links, or nest fewer quantifiers",
+        ),
+        other => Failure::internal(other),
+    }
+}
+
 /// What matching a rule came to.
 struct Found {
     count: u64,
@@ -324,12 +376,10 @@ fn find(grammar: &Grammar, snapshot: &Snapshot, rule: &Rule, keep: bool) -> Resu
         .matches(snapshot, rule, &Binding::new())
         .map_err(Failure::internal)?;
     let (count, matches) = if keep {
-        let matches: Vec<Binding> = search
-            .collect::<Result<_, _>>()
-            .map_err(Failure::internal)?;
+        let matches: Vec<Binding> = search.collect::<Result<_, _>>().map_err(unmatched)?;
         (matches.len() as u64, matches)
     } else {
-        (search.count_all().map_err(Failure::internal)?, Vec::new())
+        (search.count_all().map_err(unmatched)?, Vec::new())
     };
     Ok(Found {
         count,
