@@ -5,7 +5,9 @@
 use super::effects::{Guard, Primitive, each_primitive};
 use super::facts::Facts;
 use super::join::{Found, Plan, bytes_of_binding};
-use super::program::{Change, Environment, Link, Object, Operator, Place, Program, Term};
+use super::program::{
+    Change, Environment, Link, Object, Operator, Place, Program, Quantified, Term,
+};
 use super::truth::always;
 use super::value::evaluate;
 use super::world::World;
@@ -88,6 +90,8 @@ struct Reaching<'a> {
     seen: FxHashSet<(usize, Environment)>,
     /// Bindings of operators that still sleep.
     sleeping: Vec<Vec<Environment>>,
+    /// What each operator may bring about.
+    gains: &'a [Vec<Change>],
     /// Operators of which later facts may change what they bring about.
     open_ended: Vec<bool>,
     arrivals: VecDeque<Arrival>,
@@ -129,11 +133,14 @@ pub(crate) fn reach(
             }
         }
     }
+    let changes = program.operators.iter().map(|operator| &operator.changes);
+    let gains: Vec<Vec<Change>> = changes.map(|all| gains(all, program)).collect();
     let mut reaching = Reaching {
         plans: operators().map(|o| Plan::new(o, &world.facts)).collect(),
         sleeping: vec![Vec::new(); program.operators.len()],
         seen: FxHashSet::default(),
-        open_ended: program.operators.iter().map(open_ended).collect(),
+        open_ended: gains.iter().map(|gains| open_ended(gains)).collect(),
+        gains: &gains,
         arrivals: VecDeque::new(),
         scope,
         bytes: 0,
@@ -169,12 +176,38 @@ pub(crate) fn reach(
     Ok(reaching.reached)
 }
 
-fn open_ended(operator: &Operator) -> bool {
-    let mut found = false;
-    operator.each_change(&mut |change| {
-        found |= matches!(change, Change::Forall(_) | Change::Assign(..));
-    });
-    found
+/// Of some changes, those that may bring about a fact or a value.
+fn gains(changes: &[Change], program: &Program) -> Vec<Change> {
+    let gain = |change: &Change| match change {
+        Change::Link(_) | Change::Create(..) | Change::Retype(..) => Some(change.clone()),
+        Change::Unlink(_) | Change::Delete(_) => None,
+        Change::Assign(place, _) => {
+            program.assigned[usize::from(place.attribute())].then(|| change.clone())
+        }
+        Change::Forall(quantified) => {
+            let body = gains(&quantified.body, program);
+            (!body.is_empty()).then(|| {
+                Change::Forall(Quantified {
+                    first: quantified.first,
+                    domains: quantified.domains.clone(),
+                    body,
+                })
+            })
+        }
+        Change::When(test, body) => {
+            let body = gains(body, program);
+            (!body.is_empty()).then(|| Change::When(test.clone(), body))
+        }
+    };
+    changes.iter().filter_map(gain).collect()
+}
+
+fn open_ended(gains: &[Change]) -> bool {
+    gains.iter().any(|change| match change {
+        Change::Forall(_) | Change::Assign(..) => true,
+        Change::When(_, body) => open_ended(body),
+        _ => false,
+    })
 }
 
 impl<'a> Reaching<'a> {
@@ -342,7 +375,6 @@ impl<'a> Reaching<'a> {
 
     /// Queues what an instance may bring about; gives whether a place has new values.
     fn effects(&mut self, instance: &Instance) -> bool {
-        let operator = self.operator(instance.operator);
         let mut arrivals = Vec::new();
         let mut assigned: Vec<(Place, &Term, Environment)> = Vec::new();
         let mut environment = instance.objects.clone();
@@ -376,9 +408,8 @@ impl<'a> Reaching<'a> {
                 Primitive::Unlink(_) | Primitive::Delete(_) => {}
             }
         };
-        let changes = &operator.changes;
         each_primitive(
-            changes,
+            &self.gains[instance.operator],
             facts,
             &mut environment,
             &mut Vec::new(),
