@@ -80,7 +80,10 @@ pub(super) fn read(file: &SourceFile, defects: &mut Defects) -> Option<Expressio
                     None => read = Some(list),
                 }
             }
-            byte if byte.is_ascii_whitespace() => at += 1,
+            _ if text[at..].starts_with(char::is_whitespace) => {
+                let rest = &text[at..];
+                at += rest.len() - rest.trim_start().len();
+            }
             _ => {
                 let ends = |c: char| c.is_whitespace() || "();".contains(c);
                 let end = text[at..].find(ends).map_or(bytes.len(), |end| at + end);

@@ -141,6 +141,16 @@ fn brackets_are_held_against_each_other() {
     assert!(refusal(&deep, good).contains("nested more than 256 deep"));
 }
 
+/// A blank that is none in ASCII was read as a word of no length, again and again, until the memory was
+/// full.
+#[test]
+fn every_blank_is_one() {
+    for blank in ["\u{b}", "\u{85}", "\u{2003}"] {
+        let told = refusal(&format!("(define{blank}(domain d)"), "");
+        assert!(told.contains("`(` is never closed"), "{told}");
+    }
+}
+
 #[test]
 fn rules_in_pddl_have_the_same_best_plan() {
     let rules = grammar(CARE);
