@@ -2,14 +2,16 @@
 //! and for whoever tries to break it. It guarantees that no bytes make a decoder panic.
 
 use crate::arena::Word;
-use crate::{Change, Epoch, Refusal, Time, Transaction, desk};
+use crate::hot::{self, Key};
+use crate::shm::decode;
+use crate::{AttributeId, Change, Commit, Epoch, NodeId, Refusal, Time, Transaction, Value, desk};
 
 /// Reads a transaction as a request holds it.
 ///
 /// # Errors
 /// [`Refusal::Malformed`].
 pub fn decode_transaction(bytes: &[u8]) -> Result<Transaction, Refusal> {
-    postcard::from_bytes(bytes).map_err(|error| Refusal::Malformed(error.to_string()))
+    read(postcard::from_bytes(bytes))
 }
 
 /// Reads a change as it goes out to every agent.
@@ -17,7 +19,65 @@ pub fn decode_transaction(bytes: &[u8]) -> Result<Transaction, Refusal> {
 /// # Errors
 /// [`Refusal::Malformed`].
 pub fn decode_change(bytes: &[u8]) -> Result<Change, Refusal> {
-    postcard::from_bytes(bytes).map_err(|error| Refusal::Malformed(error.to_string()))
+    read(postcard::from_bytes(bytes))
+}
+
+/// Words as another process could have written them.
+fn page(words: &[u64]) -> Vec<Word> {
+    let page: Vec<Word> = words.iter().map(|_| Word::default()).collect();
+    for (word, value) in page.iter().zip(words) {
+        word.store(*value);
+    }
+    page
+}
+
+fn read<T>(decoded: postcard::Result<T>) -> Result<T, Refusal> {
+    decoded.map_err(|error| Refusal::Malformed(error.to_string()))
+}
+
+/// Reads a request to the store: its transactions.
+///
+/// # Errors
+/// [`Refusal::Malformed`].
+pub fn decode_request(bytes: &[u8]) -> Result<Vec<Transaction>, Refusal> {
+    read(decode::request(bytes))
+}
+
+/// Reads the store's answer to a request.
+///
+/// # Errors
+/// [`Refusal::Malformed`].
+pub fn decode_answer(bytes: &[u8]) -> Result<Vec<Result<Commit, Refusal>>, Refusal> {
+    read(decode::answers(bytes))
+}
+
+/// Reads what a session says to the store about leases; whether it can be read.
+///
+/// # Errors
+/// [`Refusal::Malformed`].
+pub fn check_lease_request(bytes: &[u8]) -> Result<(), Refusal> {
+    read(decode::lease_request(bytes))
+}
+
+/// Reads what the store answers about leases; whether it can be read.
+///
+/// # Errors
+/// [`Refusal::Malformed`].
+pub fn check_lease_answer(bytes: &[u8]) -> Result<(), Refusal> {
+    read(decode::lease_answer(bytes))
+}
+
+/// Reads a node's attribute from the words of a page of hot attributes, whoever wrote them, as a
+/// snapshot of that epoch does.
+pub fn read_hot_page(
+    words: &[u64],
+    epoch: Epoch,
+    node: NodeId,
+    attribute: AttributeId,
+) -> Option<Value> {
+    let page = page(words);
+    hot::session_of(&page)?;
+    Some(hot::read(&page, epoch, Key::of_node(node, attribute))?.value)
 }
 
 /// Reads the request for the store of that epoch that lies on a session's desk, as the store does.
@@ -26,10 +86,7 @@ pub fn decode_change(bytes: &[u8]) -> Result<Change, Refusal> {
 /// # Errors
 /// [`Refusal::Malformed`].
 pub fn decode_desk(words: &[u64], epoch: Epoch) -> Option<Result<(Time, Transaction), Refusal>> {
-    let page: Vec<Word> = words.iter().map(|_| Word::default()).collect();
-    for (word, value) in page.iter().zip(words) {
-        word.store(*value);
-    }
+    let page = page(words);
     desk::owner_of(&page)?;
     let request = desk::request_of(&page);
     let mut bytes = Vec::new();
@@ -58,7 +115,7 @@ pub fn encode_desk(
 
 /// Reads what lies on a desk.
 pub(crate) fn decode_laid(bytes: &[u8]) -> Result<(Time, Transaction), Refusal> {
-    postcard::from_bytes(bytes).map_err(|error| Refusal::Malformed(error.to_string()))
+    read(postcard::from_bytes(bytes))
 }
 
 /// A transaction as a request holds it.

@@ -2,7 +2,11 @@
 //! program would. It guarantees nothing; that is what it is for: whatever the bytes, no function
 //! here may panic or go on for ever. The tests of the workspace run the same functions.
 
-use dsr::{Epoch, Graph, ReadError, Schema, Snapshot, Time, Transaction, Version};
+use dsr::{
+    AttributeId, Epoch, Graph, LargeHandle, NodeId, NumberKind, ReadError, Schema, Snapshot, Time,
+    Transaction, Version,
+};
+use std::sync::OnceLock;
 
 fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
@@ -45,18 +49,87 @@ pub fn transaction(bytes: &[u8]) {
     }
 }
 
+fn words(bytes: &[u8]) -> Vec<u64> {
+    let (words, _) = bytes.as_chunks::<8>();
+    words.iter().map(|word| u64::from_le_bytes(*word)).collect()
+}
+
 /// A session's desk, as the store reads it: any words, but for the one that says that it is a desk.
 pub fn desk(bytes: &[u8]) {
-    let mut words = vec![u64::from_le_bytes(*b"cortexD1")];
-    words.extend(bytes.chunks_exact(8).map(|eight| {
-        let eight = eight.iter().rev();
-        eight.fold(0, |word, byte| word << 8 | u64::from(*byte))
-    }));
-    words.resize(512, 0);
-    let epoch = Epoch(words[42]);
-    if let Some(Ok((_, transaction))) = dsr::wire::decode_desk(&words, epoch) {
+    let mut desk = vec![u64::from_le_bytes(*b"cortexD1")];
+    desk.extend(words(bytes));
+    desk.resize(512, 0);
+    let epoch = Epoch(desk[42]);
+    if let Some(Ok((_, transaction))) = dsr::wire::decode_desk(&desk, epoch) {
         commit(&transaction);
     }
+}
+
+/// A request, and an answer to one.
+pub fn request(bytes: &[u8]) {
+    for transaction in dsr::wire::decode_request(bytes).unwrap_or_default() {
+        commit(&transaction);
+    }
+    for refusal in dsr::wire::decode_answer(bytes)
+        .into_iter()
+        .flatten()
+        .filter_map(Result::err)
+    {
+        assert!(!refusal.to_string().is_empty());
+    }
+}
+
+/// What goes between a session and the store about leases.
+pub fn lease(bytes: &[u8]) {
+    drop(dsr::wire::check_lease_request(bytes));
+    drop(dsr::wire::check_lease_answer(bytes));
+}
+
+/// A page of hot attributes: any words, but for the first, which says that it is one, and a number of
+/// slots in use.
+pub fn hot_page(bytes: &[u8]) {
+    let mut page = vec![u64::from_le_bytes(*b"cortexH1"), 1];
+    page.extend(words(bytes));
+    page.resize(2048, 0);
+    // Whose attribute the first slot is said to be, and of which epoch.
+    let (node, attribute, epoch) = (
+        NodeId(page[17]),
+        AttributeId(page[19] as u16),
+        Epoch(page[20]),
+    );
+    if let Some(value) = dsr::wire::read_hot_page(&page, epoch, node, attribute) {
+        dsr::json::value_to_json(&value);
+    }
+}
+
+/// The handle of a large value: its words, and what a schema, a graph and a file make of it.
+pub fn large_handle(bytes: &[u8]) {
+    let mut words = words(bytes);
+    words.resize(5, 0);
+    let words: Vec<String> = words.iter().map(u64::to_string).collect();
+    let json = serde_json::json!({"type": "large", "value": words});
+    let Ok(value) = dsr::json::value_from_json(&json, None) else {
+        return;
+    };
+    if let Some(handle) = value.as_large() {
+        for kind in NumberKind::ALL
+            .into_iter()
+            .filter(|kind| handle.is_of(*kind))
+        {
+            assert!(handle.bytes().is_multiple_of(kind.size() as u64));
+        }
+        assert!(!handle.to_string().is_empty());
+        let again = LargeHandle::new(
+            handle.stream(),
+            handle.sequence(),
+            handle.bytes(),
+            handle.shape(),
+        );
+        assert!(again.is_some_and(|again| again.shape() == handle.shape()));
+    }
+    let mut transaction = Transaction::new();
+    transaction.create_node("thing", "thing", vec![("large".to_owned(), value)]);
+    commit(&transaction);
 }
 
 /// A change as it goes to every agent.
@@ -67,7 +140,7 @@ pub fn change(bytes: &[u8]) {
     }
 }
 
-/// A graph as it goes from a supervisor to a store.
+/// A graph as it goes from a supervisor to a store; it consists of what the rows of a state folder are.
 pub fn image(bytes: &[u8]) {
     if let Ok(image) = dsr::decode_image(bytes) {
         let mut graph = Graph::in_memory(Schema::open());
@@ -75,6 +148,45 @@ pub fn image(bytes: &[u8]) {
             assert!(read(&graph.snapshot()).is_ok());
         }
     }
+}
+
+/// RoboComp DSR JSON, so that the whole input is the graph.
+pub fn robocomp(bytes: &[u8]) {
+    world(format!("{{\"DSRModel\":{}}}", text(bytes)).as_bytes());
+}
+
+/// AGM model XML, so that the whole input is the model.
+pub fn agm(bytes: &[u8]) {
+    world(format!("<AGMModel>{}</AGMModel>", text(bytes)).as_bytes());
+}
+
+/// A PDDL domain and, after a byte 0, a problem.
+pub fn pddl(bytes: &[u8]) {
+    let text = text(bytes);
+    let (domain, problem) = text.split_once('\0').unwrap_or((&text, ""));
+    let domain = grammar::SourceFile::new("domain.pddl", domain);
+    let problem = grammar::SourceFile::new("problem.pddl", problem);
+    if let Err(defects) = executive::pddl::read(&domain, &problem) {
+        assert!(!defects.is_empty());
+    }
+}
+
+/// An agent's manifest.
+pub fn manifest(bytes: &[u8]) {
+    drop(dsr::Manifest::from_toml(
+        "agent.toml",
+        &text(bytes),
+        &Schema::open(),
+    ));
+}
+
+/// Grid maps with lists of optima, and recordings of people: whichever it looks like.
+pub fn recording(bytes: &[u8]) {
+    let text = text(bytes);
+    drop(scenarios::grid_file::parse_map("a.map", &text));
+    drop(scenarios::Tracks::parse("obsmat.txt", &text));
+    drop(scenarios::scenes::parse_recording(&text));
+    drop(scenarios::scenes::parse_scenes(&text));
 }
 
 /// A schema file.
@@ -148,7 +260,8 @@ pub fn scenario(bytes: &[u8]) {
 
 /// The memory of a graph, overwritten: each eleven bytes say where (three) and with what (eight).
 pub fn arena(bytes: &[u8]) {
-    let mut words = small_graph().words();
+    static WHOLE: OnceLock<Vec<u64>> = OnceLock::new();
+    let mut words = WHOLE.get_or_init(|| small_graph().words()).clone();
     let used = words
         .iter()
         .rposition(|word| *word != 0)

@@ -142,6 +142,14 @@ fn graph_json() {
 fn worlds_of_other_systems() {
     withstands(entries::world, ROBOCOMP.as_bytes());
     withstands(entries::world, AGM.as_bytes());
+    let inner = |text: &str, from: &str, to: &str| {
+        let (_, rest) = text.split_once(from).unwrap();
+        rest.rsplit_once(to).unwrap().0.to_owned()
+    };
+    let graph = inner(ROBOCOMP, "\"DSRModel\":", "}");
+    withstands(entries::robocomp, graph.as_bytes());
+    let model = inner(AGM, "<AGMModel>", "</AGMModel>");
+    withstands(entries::agm, model.as_bytes());
 }
 
 #[test]
@@ -167,6 +175,54 @@ fn desks() {
 }
 
 #[test]
+fn requests_and_answers() {
+    // A client, its first request, its name and process, a time, and one transaction.
+    let mut request = vec![5, 1, 5];
+    request.extend(b"agent");
+    request.extend([6, 0, 1]);
+    request.extend(encode_transaction(&transaction()));
+    assert_eq!(dsr::wire::decode_request(&request), Ok(vec![transaction()]));
+    withstands(entries::request, &request);
+    // Version 7 at time 0 that made node 3, not on disk; and a conflict.
+    let mut answer = vec![2, 0, 7, 0, 1, 3, 0, 1, 0, 3];
+    answer.extend(b"why");
+    let answers = dsr::wire::decode_answer(&answer).unwrap();
+    assert!(answers[0].is_ok() && answers[1].is_err());
+    withstands(entries::request, &answer);
+}
+
+#[test]
+fn leases() {
+    // End the lease of an epoch and a token; and that it is given, with its place and token.
+    assert!(dsr::wire::check_lease_request(&[1, 9, 4]).is_ok());
+    assert!(dsr::wire::check_lease_answer(&[0, 1, 2, 3]).is_ok());
+    withstands(entries::lease, &[0, 1, 9, 4, 5, 6]);
+    withstands(entries::lease, &[0, 1, 2, 3]);
+}
+
+#[test]
+fn pages_of_hot_attributes() {
+    // From the number of slots on: one slot with its sequence, key, epoch, and an f64 of time 9.
+    let mut page = vec![0u64; 30];
+    page[0] = 1;
+    page[14..23].copy_from_slice(&[2, 5, 0, 1, 3, 6 | 1 << 32, 0, 9, 0.5f64.to_bits()]);
+    let whole = [&[u64::from_le_bytes(*b"cortexH1"), 1], &page[..]].concat();
+    let whole: Vec<u64> = whole.into_iter().chain([0; 2048]).collect();
+    let (epoch, node, name) = (dsr::Epoch(3), dsr::NodeId(5), dsr::AttributeId(1));
+    let value = dsr::wire::read_hot_page(&whole, epoch, node, name);
+    assert_eq!(value, Some(0.5.into()));
+    let bytes: Vec<u8> = page.iter().flat_map(|word| word.to_le_bytes()).collect();
+    withstands(entries::hot_page, &bytes);
+}
+
+#[test]
+fn handles_of_large_values() {
+    let words = [7u64, 1, 24, 2 | 3 << 32, 0];
+    let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+    withstands(entries::large_handle, &bytes);
+}
+
+#[test]
 fn images() {
     let image = Image::of(&entries::small_graph().snapshot()).unwrap();
     withstands(entries::image, &image.to_bytes());
@@ -186,6 +242,39 @@ fn grammars_and_goals() {
     let goal =
         b"{ \"robot\":robot r:room \"robot\"->r(in) }\nprecondition { (not \"robot\"->r(at)) }";
     withstands(entries::goal, goal);
+}
+
+const PDDL: &str = "(define (domain d) (:requirements :typing :action-costs) (:types room)
+    (:predicates (at ?r - room) (door ?a ?b - room)) (:functions (total-cost))
+    (:action go :parameters (?a ?b - room) :precondition (and (at ?a) (door ?a ?b))
+     :effect (and (not (at ?a)) (at ?b) (increase (total-cost) 1))))\0
+    (define (problem p) (:domain d) (:objects k l - room) (:init (at k) (door k l))
+     (:goal (at l)) (:metric minimize (total-cost)))";
+
+#[test]
+fn tasks_in_pddl() {
+    let (domain, problem) = PDDL.split_once('\0').unwrap();
+    let [domain, problem] = [domain, problem].map(|text| grammar::SourceFile::new("task", text));
+    assert!(executive::pddl::read(&domain, &problem).is_ok());
+    withstands(entries::pddl, PDDL.as_bytes());
+}
+
+#[test]
+fn manifests() {
+    withstands(
+        entries::manifest,
+        &shipped("src/manifests/social_mapping.toml"),
+    );
+}
+
+#[test]
+fn maps_and_recordings() {
+    let map = "type octile\nheight 2\nwidth 3\nmap\n.@.\n...\n";
+    assert!(scenarios::grid_file::parse_map("a.map", map).is_ok());
+    withstands(entries::recording, map.as_bytes());
+    let tracks = "0 1 1.0 0 2.0 0.5 0 0.5\n10 1 1.5 0 2.5 0.5 0 0.5\n";
+    assert!(scenarios::Tracks::parse("obsmat.txt", tracks).is_ok());
+    withstands(entries::recording, tracks.as_bytes());
 }
 
 #[test]

@@ -46,7 +46,7 @@ impl From<InstanceError> for LeaseError {
 }
 
 #[derive(Debug, Serialize, Deserialize)]
-enum Ask {
+pub(super) enum Ask {
     /// Keep this version for so long.
     Keep {
         process: u32,
@@ -59,7 +59,7 @@ enum Ask {
 }
 
 /// The place and the token of a lease; `None` where the store has another epoch.
-type Answer = Result<Option<(u64, u64)>, LeaseRefusal>;
+pub(super) type Answer = Result<Option<(u64, u64)>, LeaseRefusal>;
 type Factory = request_response::PortFactory<Ipc, [u8], (), [u8], ()>;
 
 fn service(node: &IpcNode) -> Result<Factory, InstanceError> {

@@ -10,6 +10,7 @@ mod bare;
 mod bell;
 mod changes;
 mod channel;
+pub(crate) mod decode;
 mod gate;
 mod hot;
 mod large;
