@@ -75,9 +75,11 @@ fn processes_that_are_killed_while_they_join_leave_room_for_others() {
     use_all(&mut session);
     drop(session);
     let only_the_living = within(PATIENCE, || {
-        // Whoever comes and goes has the store look whom it is connected to.
+        // Whoever comes and goes has the store look whom it is connected to, a moment later.
         Process::peer("join", &instance).finish();
-        (everything(&instance) == before).then_some(())
+        within(Duration::from_secs(1), || {
+            (everything(&instance) == before).then_some(())
+        })
     });
     let left: Vec<_> = everything(&instance).difference(&before).cloned().collect();
     assert!(only_the_living.is_some(), "{left:#?}");

@@ -6,7 +6,7 @@
 
 use super::page::LINE;
 use super::{
-    InstanceError, Ipc, IpcNode, MAX_PROCESSES, MAX_STORES, Segment, ipc, one_at_a_time,
+    InstanceError, Ipc, IpcNode, MAX_PROCESSES, MAX_STORES, Segment, ipc, one_at_a_time, port,
     service_name,
 };
 use crate::Epoch;
@@ -211,11 +211,9 @@ pub(crate) struct ArenaSubscriber {
 
 impl ArenaSubscriber {
     pub(crate) fn open(node: &IpcNode) -> Result<Self, InstanceError> {
-        let subscriber = service(node)?
-            .subscriber_builder()
-            .buffer_size(CAPACITY)
-            .create()
-            .map_err(|e| ipc("the arena's subscriber", e))?;
+        let service = service(node)?;
+        let make = || service.subscriber_builder().buffer_size(CAPACITY).create();
+        let subscriber = port(node, make).map_err(|e| ipc("the arena's subscriber", e))?;
         Ok(Self {
             subscriber,
             arena: None,

@@ -3,7 +3,8 @@
 //! buffer is full the oldest message gives way.
 
 use super::{
-    InstanceError, Ipc, IpcNode, MAX_PROCESSES, ROOM, ipc, one_at_a_time, room_for, service_name,
+    InstanceError, Ipc, IpcNode, MAX_PROCESSES, ROOM, ipc, one_at_a_time, port, room_for,
+    service_name,
 };
 use iceoryx2::port::publisher::Publisher as IpcPublisher;
 use iceoryx2::port::subscriber::Subscriber as IpcSubscriber;
@@ -50,14 +51,16 @@ pub struct Publisher<T> {
 impl<T: Serialize> Publisher<T> {
     pub(crate) fn open(node: &IpcNode, name: &str) -> Result<Self, InstanceError> {
         let service = service(node, name)?;
-        let port = service
-            .publisher_builder()
-            .initial_max_slice_len(SMALL)
-            .allocation_strategy(AllocationStrategy::PowerOfTwo)
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            .override_sample_preallocation(|worst| worst.min(UNDER_WAY))
-            .create()
-            .map_err(|e| ipc(&format!("channel `{name}`"), e))?;
+        let make = || {
+            service
+                .publisher_builder()
+                .initial_max_slice_len(SMALL)
+                .allocation_strategy(AllocationStrategy::PowerOfTwo)
+                .backpressure_strategy(BackpressureStrategy::DiscardData)
+                .override_sample_preallocation(|worst| worst.min(UNDER_WAY))
+                .create()
+        };
+        let port = port(node, make).map_err(|e| ipc(&format!("channel `{name}`"), e))?;
         Ok(Self {
             port,
             service,
@@ -100,11 +103,9 @@ pub struct Subscriber<T> {
 
 impl<T: DeserializeOwned> Subscriber<T> {
     pub(crate) fn open(node: &IpcNode, name: &str) -> Result<Self, InstanceError> {
-        let port = service(node, name)?
-            .subscriber_builder()
-            .buffer_size(BUFFER)
-            .create()
-            .map_err(|e| ipc(&format!("channel `{name}`"), e))?;
+        let service = service(node, name)?;
+        let make = || service.subscriber_builder().buffer_size(BUFFER).create();
+        let port = port(node, make).map_err(|e| ipc(&format!("channel `{name}`"), e))?;
         Ok(Self {
             port,
             message: PhantomData,

@@ -6,7 +6,7 @@
 //! a lock makes it all of the time. The lock is one on the instance's folder, which leaves no file
 //! behind and is given back by the kernel when its holder dies.
 
-use super::{Instance, InstanceError, IpcNode, ipc, leftovers};
+use super::{Instance, InstanceError, IpcNode, ipc, leftovers, now, pause};
 use iceoryx2::config::Config;
 use iceoryx2::node::Node;
 use iceoryx2::prelude::{NodeBuilder, SignalHandlingMode};
@@ -20,6 +20,8 @@ use std::time::{Duration, Instant};
 
 /// How long a process waits for another to get through.
 const PATIENCE: Duration = Duration::from_secs(2);
+/// How long it tries again to open what the dead may still hold.
+const CLEANED: Duration = Duration::from_secs(1);
 /// How often it looks.
 const LOOK: Duration = Duration::from_millis(1);
 /// The mode of a service's description while it is being written; readable alone once it is whole.
@@ -95,15 +97,41 @@ pub(super) fn one_at_a_time<T, E>(node: &IpcNode, open: impl Fn() -> Result<T, E
         tracing::warn!("another process has held {folder} for {PATIENCE:?}; is it stopped?");
         return open();
     };
-    remove_half_made(Path::new(&config.global.service_dir().to_string()));
-    leftovers::remove_half_made(config, |name| name.ends_with(".dynamic"));
-    open().or_else(|first| match leftovers::clean(config, || Some(())) {
-        Ok(_) => open(),
-        Err(error) => {
-            tracing::debug!("cleaning up after dead processes: {error}");
-            Err(first)
-        }
+    let remove = || {
+        remove_half_made(Path::new(&config.global.service_dir().to_string()));
+        leftovers::remove_half_made(config, |name| name.ends_with(".dynamic"));
+    };
+    remove();
+    open().or_else(|_| {
+        // What was told from a living process's work by its age is old enough now.
+        remove();
+        without_the_dead(config, || Some(()), open)
     })
+}
+
+/// Makes a port. Where that fails it is tried again without what dead processes left: the places that
+/// they hold.
+pub(super) fn port<T, E>(node: &IpcNode, make: impl Fn() -> Result<T, E>) -> Result<T, E> {
+    let config = node.config();
+    make().or_else(|_| without_the_dead(config, || Gate::of(config), make))
+}
+
+/// Cleans up after the dead and tries again what failed, for as long as others who clean may take.
+fn without_the_dead<T, E, G>(
+    config: &Config,
+    enter: impl Fn() -> Option<G>,
+    again: impl Fn() -> Result<T, E>,
+) -> Result<T, E> {
+    let deadline = now() + CLEANED;
+    loop {
+        if let Err(error) = leftovers::clean(config, &enter) {
+            tracing::debug!("cleaning up after dead processes: {error}");
+        }
+        match again() {
+            Err(_) if now() < deadline => pause(LOOK),
+            last => return last,
+        }
+    }
 }
 
 /// Removes the descriptions of services whose maker was killed while it made them: iceoryx2 would wait

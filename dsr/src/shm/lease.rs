@@ -4,7 +4,7 @@
 
 use super::presence::Presence;
 use super::session::{REQUESTS_EVENT, event};
-use super::{InstanceError, Ipc, IpcNode, MAX_PROCESSES, ipc, one_at_a_time, service_name};
+use super::{InstanceError, Ipc, IpcNode, MAX_PROCESSES, ipc, one_at_a_time, port, service_name};
 use crate::arena::LeaseMark;
 use crate::graph::LeaseRefusal;
 use crate::{AttachError, Epoch, Graph, Snapshot, Version};
@@ -82,16 +82,18 @@ pub(super) struct Tenant {
 
 impl Tenant {
     pub(super) fn open(node: &IpcNode) -> Result<Self, InstanceError> {
-        let client = service(node)?
-            .client_builder()
-            .initial_max_slice_len(64)
-            .allocation_strategy(AllocationStrategy::PowerOfTwo)
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            .create()
-            .map_err(|e| ipc("the leases' client", e))?;
-        let bell = event(node, REQUESTS_EVENT)?
-            .notifier_builder()
-            .create()
+        let service = service(node)?;
+        let make = || {
+            service
+                .client_builder()
+                .initial_max_slice_len(64)
+                .allocation_strategy(AllocationStrategy::PowerOfTwo)
+                .backpressure_strategy(BackpressureStrategy::DiscardData)
+                .create()
+        };
+        let client = port(node, make).map_err(|e| ipc("the leases' client", e))?;
+        let bell = event(node, REQUESTS_EVENT)?;
+        let bell = port(node, || bell.notifier_builder().create())
             .map_err(|e| ipc("the leases' bell", e))?;
         Ok(Self { client, bell })
     }

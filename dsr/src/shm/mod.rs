@@ -32,7 +32,7 @@ pub(crate) use segment::{Segment, Segments};
 pub use session::{AttachError, ClockError, CommitError, Session, Tick};
 pub use store::{Store, StoreError};
 
-use gate::{Gate, one_at_a_time};
+use gate::{Gate, one_at_a_time, port};
 use iceoryx2::config::Config;
 use iceoryx2::port::listener::{Listener, ListenerWaitError};
 use iceoryx2::prelude::{

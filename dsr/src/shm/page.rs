@@ -4,7 +4,7 @@
 
 use super::session::NEWS;
 use super::{
-    InstanceError, Ipc, IpcNode, MAX_PROCESSES, Segment, ipc, now, one_at_a_time, pause,
+    InstanceError, Ipc, IpcNode, MAX_PROCESSES, Segment, ipc, now, one_at_a_time, pause, port,
     service_name,
 };
 use crate::arena::Word;
@@ -63,15 +63,18 @@ impl OwnPage {
         format: impl FnOnce(&[Word]),
     ) -> Result<Self, InstanceError> {
         let failed = |e: &dyn std::fmt::Display| ipc(&format!("a page of `{name}`"), e);
-        let publisher = service(node, name)?
-            .publisher_builder()
-            .initial_max_slice_len(len)
-            .allocation_strategy(AllocationStrategy::Static)
-            .max_loaned_samples(1)
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            .override_sample_preallocation(|_| 2)
-            .create()
-            .map_err(|e| failed(&e))?;
+        let service = service(node, name)?;
+        let make = || {
+            service
+                .publisher_builder()
+                .initial_max_slice_len(len)
+                .allocation_strategy(AllocationStrategy::Static)
+                .max_loaned_samples(1)
+                .backpressure_strategy(BackpressureStrategy::DiscardData)
+                .override_sample_preallocation(|_| 2)
+                .create()
+        };
+        let publisher = port(node, make).map_err(|e| failed(&e))?;
         let loan = publisher.loan_slice_uninit(len).map_err(|e| failed(&e))?;
         let sample = loan.write_from_fn(|_| Word::default());
         let start = sample.payload().as_ptr();
@@ -119,9 +122,8 @@ pub(super) struct Pages {
 
 impl Pages {
     pub(super) fn open(node: &IpcNode, name: &str) -> Result<Self, InstanceError> {
-        let subscriber = service(node, name)?
-            .subscriber_builder()
-            .create()
+        let service = service(node, name)?;
+        let subscriber = port(node, || service.subscriber_builder().create())
             .map_err(|e| ipc(&format!("pages `{name}`"), e))?;
         let name = name.to_owned();
         Ok(Self { subscriber, name })

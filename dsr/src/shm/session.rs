@@ -26,7 +26,7 @@ use super::lease::Tenant;
 use super::page::OwnPage;
 use super::{
     Instance, InstanceError, Ipc, IpcNode, MAX_PROCESSES, Publisher, Subscriber, ipc, now,
-    one_at_a_time, pause, service_name,
+    one_at_a_time, pause, port, service_name,
 };
 use crate::arena::{Arena, Root, record};
 use crate::{Epoch, Filter, ReadError, Schema, Snapshot};
@@ -52,6 +52,8 @@ pub(super) const NEWS: Duration = Duration::from_micros(50);
 
 /// How long a store may take to answer before the asker gives up.
 const PATIENCE: Duration = Duration::from_secs(5);
+/// How often a session looks whether there is a store.
+const LOOK: Duration = Duration::from_millis(5);
 
 pub(super) fn event(
     node: &IpcNode,
@@ -131,18 +133,20 @@ impl Session {
         instance.create_folder()?;
         let node = instance.join()?;
         let arena = ArenaSubscriber::open(&node)?;
-        let client = requests(&node)?
-            .client_builder()
-            .initial_max_slice_len(4096)
-            .allocation_strategy(AllocationStrategy::PowerOfTwo)
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            // The store may still read one that was sent again.
-            .override_request_preallocation(|worst| worst.min(2 * ASKED))
-            .create()
-            .map_err(|e| ipc("the store's client", e))?;
-        let wake_store = event(&node, REQUESTS_EVENT)?
-            .notifier_builder()
-            .create()
+        let requests = requests(&node)?;
+        let make = || {
+            requests
+                .client_builder()
+                .initial_max_slice_len(4096)
+                .allocation_strategy(AllocationStrategy::PowerOfTwo)
+                .backpressure_strategy(BackpressureStrategy::DiscardData)
+                // The store may still read one that was sent again.
+                .override_request_preallocation(|worst| worst.min(2 * ASKED))
+                .create()
+        };
+        let client = port(&node, make).map_err(|e| ipc("the store's client", e))?;
+        let bell = event(&node, REQUESTS_EVENT)?;
+        let wake_store = port(&node, || bell.notifier_builder().create())
             .map_err(|e| ipc("the store's bell", e))?;
         let session = Self {
             instance: instance.clone(),
@@ -171,7 +175,8 @@ impl Session {
         Ok(session)
     }
 
-    /// Joins an instance and waits up to `patience` for its graph.
+    /// Joins an instance and waits up to `patience` for its graph, also where it takes the store that long
+    /// to remove what stands in the way of joining.
     ///
     /// # Errors
     /// [`AttachError`].
@@ -180,8 +185,17 @@ impl Session {
         agent: &str,
         patience: Duration,
     ) -> Result<Self, AttachError> {
-        let mut session = Self::join(instance, agent)?;
-        session.wait_for_store(patience)?;
+        let deadline = now() + patience;
+        let mut session = loop {
+            match Self::join(instance, agent) {
+                Err(InstanceError::Ipc(error)) if now() < deadline => {
+                    tracing::debug!("joining `{}`: {error}", instance.name());
+                    pause(LOOK);
+                }
+                joined => break joined?,
+            }
+        };
+        session.wait_for_store(deadline.saturating_duration_since(now()))?;
         Ok(session)
     }
 
@@ -197,8 +211,7 @@ impl Session {
                 return Err(self.no_store());
             }
             ring(&self.wake_store);
-            let nap = left.min(Duration::from_millis(5));
-            pause(nap);
+            pause(left.min(LOOK));
         }
         Ok(())
     }

@@ -3,7 +3,7 @@
 
 use super::{Session, event};
 use crate::Time;
-use crate::shm::{InstanceError, Publisher, Subscriber, ipc, wait};
+use crate::shm::{InstanceError, Publisher, Subscriber, ipc, port, wait};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 use thiserror::Error;
@@ -37,9 +37,8 @@ impl Session {
         &self,
     ) -> Result<impl Fn(Tick) -> Result<(), InstanceError> + use<>, InstanceError> {
         let publisher = Publisher::<Tick>::open(&self.node, CLOCK)?;
-        let notifier = event(&self.node, CLOCK_EVENT)?
-            .notifier_builder()
-            .create()
+        let event = event(&self.node, CLOCK_EVENT)?;
+        let notifier = port(&self.node, || event.notifier_builder().create())
             .map_err(|e| ipc("the clock", e))?;
         Ok(move |tick| {
             publisher.send(&tick)?;
@@ -56,9 +55,8 @@ impl Session {
     /// [`ClockError`].
     pub fn wait_for_tick(&mut self, patience: Duration) -> Result<Option<Tick>, ClockError> {
         if self.clock.is_none() {
-            let listener = event(&self.node, CLOCK_EVENT)?
-                .listener_builder()
-                .create()
+            let event = event(&self.node, CLOCK_EVENT)?;
+            let listener = port(&self.node, || event.listener_builder().create())
                 .map_err(|e| ipc("the clock", e))?;
             self.clock = Some((listener, Subscriber::open(&self.node, CLOCK)?));
         }
