@@ -2,6 +2,8 @@
 //! which cell a point lies in and where a cell's centre is, the same for writer and reader; and it
 //! guarantees that what is no grid is refused.
 
+pub mod shared;
+
 use nalgebra::Point2;
 
 /// A rectangular grid of traversal costs in the world frame (READING.md item 7).
@@ -30,6 +32,68 @@ pub const FREE: f32 = 1.0;
 /// Column and row of a cell.
 pub type Cell = (usize, usize);
 
+/// A rectangle of cells: first column and row, and those after the last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Region {
+    /// Along x.
+    pub columns: (usize, usize),
+    /// Along y.
+    pub rows: (usize, usize),
+}
+
+impl Region {
+    /// Whether it has no cells.
+    pub fn is_empty(&self) -> bool {
+        self.columns.0 >= self.columns.1 || self.rows.0 >= self.rows.1
+    }
+
+    /// Whether the two have a cell in common.
+    pub fn meets(&self, other: &Self) -> bool {
+        self.columns.0 < other.columns.1
+            && other.columns.0 < self.columns.1
+            && self.rows.0 < other.rows.1
+            && other.rows.0 < self.rows.1
+    }
+
+    /// The cells in both.
+    #[must_use]
+    pub fn common(&self, other: &Self) -> Self {
+        let both = |a: (usize, usize), b: (usize, usize)| (a.0.max(b.0), a.1.min(b.1));
+        Self {
+            columns: both(self.columns, other.columns),
+            rows: both(self.rows, other.rows),
+        }
+    }
+
+    /// How many cells it has.
+    pub fn area(&self) -> usize {
+        let length = |(start, end): (usize, usize)| end.saturating_sub(start);
+        length(self.columns) * length(self.rows)
+    }
+
+    /// The smallest region around both. An empty one adds nothing.
+    #[must_use]
+    pub fn joined(&self, other: &Self) -> Self {
+        if self.is_empty() {
+            return *other;
+        }
+        if other.is_empty() {
+            return *self;
+        }
+        let join = |a: (usize, usize), b: (usize, usize)| (a.0.min(b.0), a.1.max(b.1));
+        Self {
+            columns: join(self.columns, other.columns),
+            rows: join(self.rows, other.rows),
+        }
+    }
+
+    /// Where each of its rows stands in the costs of a grid with `width` columns.
+    pub fn row_ranges(&self, width: usize) -> impl Iterator<Item = std::ops::Range<usize>> + use<> {
+        let (start, end) = self.columns;
+        (self.rows.0..self.rows.1).map(move |row| row * width + start..row * width + end)
+    }
+}
+
 impl CostGrid {
     /// A grid of free cells that covers `bounds` (xmin, ymin, xmax, ymax; metres).
     pub fn covering(bounds: [f64; 4], resolution: f64) -> Self {
@@ -41,6 +105,14 @@ impl CostGrid {
             width,
             height,
             costs: vec![FREE; width * height],
+        }
+    }
+
+    /// All its cells.
+    pub fn whole(&self) -> Region {
+        Region {
+            columns: (0, self.width),
+            rows: (0, self.height),
         }
     }
 
@@ -201,5 +273,21 @@ mod tests {
         }
         assert_eq!(grid.cell_at(Point2::new(-1.01, 3.0)), None);
         assert_eq!(grid.cell_at(Point2::new(0.0, 4.01)), None);
+    }
+
+    #[test]
+    fn regions_join_and_meet_as_sets_of_cells_do() {
+        let region = |columns, rows| Region { columns, rows };
+        let (one, other) = (region((1, 4), (0, 2)), region((3, 9), (1, 5)));
+        assert!(one.meets(&other) && !one.meets(&region((4, 9), (0, 9))));
+        assert_eq!(one.common(&other), region((3, 4), (1, 2)));
+        assert_eq!(one.joined(&other), region((1, 9), (0, 5)));
+        assert_eq!(one.joined(&Region::default()), one);
+        assert_eq!(Region::default().joined(&one), one);
+        assert_eq!(
+            (one.area(), one.common(&region((4, 9), (0, 9))).area()),
+            (6, 0)
+        );
+        assert_eq!(one.row_ranges(10).collect::<Vec<_>>(), [1..4, 11..14]);
     }
 }

@@ -1,7 +1,7 @@
 //! The agents as processes: each takes turns, gives its core what has come in, and does what the
 //! core decided. It guarantees that a turn whose snapshot was overtaken is left out, not guessed.
 
-use crate::grid::{CostGrid, GridError};
+use crate::grid::shared::{GridReadError, GridUpdate, GridWriter, SharedGrid, newest_grid, world};
 use crate::human_observer::HumanObserver;
 use crate::messages::{
     CameraFrame, DETECTIONS, LASER, LaserScan, ODOMETRY, Odometry, SPEECH, Speech, VELOCITY,
@@ -12,18 +12,11 @@ use crate::object_recognition::ObjectRecognition;
 use crate::social_mapping::config::{ConfigError, SocialConfig};
 use crate::social_mapping::graph::{SocialMapping, StepError};
 use dsr::{
-    AttachError, Begin, InstanceError, LargeAttribute, LargeError, LargeHandle, LargeReadError,
-    NodeId, Owner, ReadError, Session, Snapshot, Time, Transaction, TurnError, Value,
+    AttachError, Begin, InstanceError, LargeError, ReadError, Session, Snapshot, Time, Transaction,
+    TurnError,
 };
-use std::time::Duration;
 use thiserror::Error;
 
-/// The attribute of the world that holds the social grid: its costs, row by row from the lowest y, each
-/// row from the lowest x.
-pub const SOCIAL_GRID: &str = "social_grid";
-/// The attribute of the world that says where the social grid lies: x and y of its lower left corner and
-/// the side of a cell, metres, world frame.
-pub const SOCIAL_GRID_PLACE: &str = "social_grid_place";
 /// Seconds between updates of the social map.
 const MAP_PERIOD: f64 = 0.1;
 
@@ -102,78 +95,12 @@ pub fn object_recognition(session: Session, begin: Begin) -> Result<(), ProcessE
     })
 }
 
-/// The node of the world, once there is one.
-fn world(snapshot: &Snapshot) -> Result<Option<NodeId>, ReadError> {
-    let world = snapshot.nodes_of("world").next().transpose()?;
-    Ok(world.map(|world| world.id()))
-}
-
-/// Sends the grid, and says in the transaction which it is and where it lies.
-fn give_out(
-    grid: &CostGrid,
-    world: NodeId,
-    grids: &mut LargeAttribute,
-    transaction: &mut Transaction,
-) -> Result<(), LargeError> {
-    let mut loan = grids.loan(size_of_val(grid.costs.as_slice()))?;
-    if let Some(costs) = loan.numbers_mut::<f32>() {
-        costs.copy_from_slice(&grid.costs);
-    }
-    loan.send_into(transaction, &[grid.height as u32, grid.width as u32])?;
-    let place = [grid.origin.x, grid.origin.y, grid.resolution];
-    transaction.set(world, SOCIAL_GRID_PLACE, place);
-    Ok(())
-}
-
-/// Why there is no new grid.
-#[derive(Debug, Error)]
-enum GridReadError {
-    #[error(transparent)]
-    Read(#[from] ReadError),
-    #[error(transparent)]
-    Large(#[from] LargeReadError),
-    #[error("it does not say where it lies, or of which shape it is")]
-    Place,
-    #[error(transparent)]
-    Grid(#[from] GridError),
-}
-
-/// The social grid that a snapshot speaks of, where it is another than the known one.
-fn newest_grid(
-    session: &mut Session,
-    snapshot: &Snapshot,
-    known: Option<&LargeHandle>,
-) -> Result<Option<(LargeHandle, CostGrid)>, GridReadError> {
-    let Some(world) = world(snapshot)? else {
-        return Ok(None);
-    };
-    let Some(world) = snapshot.find_node(world)? else {
-        return Ok(None);
-    };
-    let (value, place) = (world.value(SOCIAL_GRID)?, world.value(SOCIAL_GRID_PLACE)?);
-    let handle = value.as_ref().and_then(Value::as_large);
-    let Some(handle) = handle.filter(|handle| Some(*handle) != known) else {
-        return Ok(None);
-    };
-    let costs = session.read_large(handle, Duration::ZERO)?;
-    let (Some(costs), Some(&[x, y, resolution]), &[height, width]) = (
-        costs.numbers::<f32>(),
-        place.as_ref().and_then(Value::as_f64s),
-        handle.shape(),
-    ) else {
-        return Err(GridReadError::Place);
-    };
-    let shape = [height as usize, width as usize];
-    let grid = CostGrid::new([x, y].into(), resolution, shape, costs)?;
-    Ok(Some((*handle, grid)))
-}
-
 /// Runs social mapping until it shall end.
 ///
 /// # Errors
 /// [`ProcessError`].
 pub fn social_mapping(mut session: Session, begin: Begin) -> Result<(), ProcessError> {
-    let (mut grids, mut uncommitted) = (None, None);
+    let (mut writer, mut uncommitted): (Option<GridWriter>, Option<GridUpdate>) = (None, None);
     let core = SocialMapping::new(SocialConfig::default(), MAP_PERIOD);
     let mut core = core.map_err(ProcessError::Config)?;
     let mut turns = begin()?;
@@ -194,15 +121,19 @@ pub fn social_mapping(mut session: Session, begin: Begin) -> Result<(), ProcessE
             tracing::warn!(time = %tick.time, "{rejection}");
         }
         let mut transaction = turn.transaction;
-        uncommitted = turn.grid.or(uncommitted);
-        if let Some(grid) = &uncommitted
-            && let Some(world) = world(&snapshot)?
-        {
-            let grids = match &mut grids {
-                Some(grids) => grids,
-                None => grids.insert(session.large(Owner::Node(world.into()), SOCIAL_GRID)?),
-            };
-            give_out(grid, world, grids, &mut transaction)?;
+        uncommitted = match turn.grid {
+            Some(grid) => Some(grid.after(uncommitted.as_ref())),
+            None => uncommitted,
+        };
+        if let Some(grid) = &uncommitted {
+            if writer.is_none()
+                && let Some(world) = current(world(&snapshot))?.flatten()
+            {
+                writer = Some(GridWriter::open(&mut session, world.id())?);
+            }
+            if let Some(writer) = &mut writer {
+                writer.give_out(grid, &mut transaction)?;
+            }
         }
         if session.submit(&transaction, tick.time)?.is_some() {
             uncommitted = None;
@@ -222,13 +153,13 @@ pub fn navigation(mut session: Session, begin: Begin) -> Result<(), ProcessError
     let speech = session.publisher::<Speech>(SPEECH)?;
     let mut core = Navigation::new(crate::navigation::navigator::Config::default());
     let (mut pose, mut scan) = (None, None);
-    let mut grid: Option<(LargeHandle, CostGrid)> = None;
+    let mut grid: Option<SharedGrid> = None;
     let mut turns = begin()?;
     while let Some(tick) = turns.next(&mut session)? {
         pose = odometry.newest()?.or(pose);
         scan = scans.newest()?.or(scan);
         let snapshot = session.snapshot()?;
-        let known = grid.as_ref().map(|(handle, _)| handle);
+        let known = grid.as_ref().map(|shared| &shared.handle);
         match newest_grid(&mut session, &snapshot, known) {
             Ok(newest) => grid = newest.or(grid),
             Err(GridReadError::Read(error)) => drop(current::<()>(Err(error))?),
@@ -237,7 +168,7 @@ pub fn navigation(mut session: Session, begin: Begin) -> Result<(), ProcessError
         let messages = Messages {
             odometry: pose.as_ref(),
             scan: scan.as_ref(),
-            grid: grid.as_ref().map(|(_, grid)| grid),
+            grid: grid.as_ref().map(|shared| &shared.grid),
         };
         let Some(effects) = current(core.step(tick.time, &messages, &snapshot))? else {
             continue;

@@ -1,7 +1,8 @@
 //! What the shared graph says when a run begins: all that a centre's staff would enter beforehand.
 //! Objects and people are not in it; the agents must perceive them.
 
-use crate::scenario::{Door, Scenario};
+use crate::scenario::{Activity, Door, Scenario};
+use agents::social_mapping::graph::SETTINGS;
 use dsr::{EdgeRef, Operation, Schema, SchemaFileError, Transaction, Value};
 use nalgebra::{Isometry2, Point2};
 
@@ -25,12 +26,16 @@ pub fn schema() -> Result<Schema, SchemaFileError> {
 pub fn initial_graph(scenario: &Scenario) -> Transaction {
     let mut graph = Transaction::new();
     let walls = scenario.walls.iter().flat_map(|wall| flat(wall)).collect();
-    let world = vec![
+    let mut world = vec![
         attribute("walls", Value::F64List(walls)),
         attribute("bounds", scenario.bounds),
         attribute("social", true),
         attribute("scenario", scenario.name.as_str()),
     ];
+    // Figures that JSON cannot have are in no scenario.
+    if let Ok(settings) = serde_json::to_string(&scenario.social) {
+        world.push(attribute(SETTINGS, settings.as_str()));
+    }
     graph.create_node("world", WORLD, world);
     for room in &scenario.rooms {
         let polygon = Value::F64List(flat(&room.polygon));
@@ -53,14 +58,19 @@ pub fn initial_graph(scenario: &Scenario) -> Transaction {
     }
     add_robot(&mut graph, scenario);
     for activity in &scenario.activities {
-        let attributes = vec![
-            attribute("start", activity.start.seconds()),
-            attribute("end", activity.end.seconds()),
-            attribute("object", activity.object.as_str()),
-        ];
-        graph.create_node("activity", &activity.name, attributes);
+        graph.create_node("activity", &activity.name, activity_attributes(activity));
     }
     graph
+}
+
+/// What the graph says of an activity.
+pub fn activity_attributes(activity: &Activity) -> Vec<(String, Value)> {
+    vec![
+        attribute("start", activity.start.seconds()),
+        attribute("end", activity.end.seconds()),
+        attribute("object", activity.object.as_str()),
+        attribute("cancelled", activity.cancelled),
+    ]
 }
 
 fn add_robot(graph: &mut Transaction, scenario: &Scenario) {

@@ -19,7 +19,7 @@ pub mod situation;
 pub mod tracks;
 pub mod world;
 
-pub use initial_graph::{WORLD, initial_graph, schema};
+pub use initial_graph::{WORLD, activity_attributes, initial_graph, schema};
 pub use resume::{ResumeError, resume};
 pub use scenario::{LoadError, Scenario};
 pub use tracks::{Tracks, TracksError};

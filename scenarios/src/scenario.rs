@@ -10,16 +10,20 @@ mod geometry;
 mod load;
 mod people;
 mod reader;
+mod schedule;
 mod space;
 #[cfg(test)]
 mod tests;
 mod value;
 
 pub use diagnostic::{Invalid, LoadError, Problem, ProblemKind};
+pub use file::parse_social;
 pub use load::MAIN_FILE;
+pub use schedule::parse_schedule;
 #[cfg(test)]
 pub(crate) use space::CLASSES;
 
+use agents::social_mapping::SocialConfig;
 use dsr::Time;
 use nalgebra::{Isometry2, Point2, Vector2};
 use std::path::PathBuf;
@@ -67,6 +71,8 @@ pub struct Scenario {
     pub rules: String,
     /// How recorded pedestrians map into this world.
     pub tracks: TracksFrame,
+    /// The figures of social mapping.
+    pub social: SocialConfig,
 }
 
 /// A room.
@@ -282,6 +288,8 @@ pub struct Activity {
     pub start: Time,
     /// When it ends; later than `start`.
     pub end: Time,
+    /// Whether it does not take place after all.
+    pub cancelled: bool,
 }
 
 /// Something the robot shall do.

@@ -20,10 +20,25 @@ pub struct Recording {
 pub struct Frame {
     /// As the file counts time.
     pub time: f64,
-    /// Names (numbers in the file) and poses, world frame.
-    pub people: Vec<(u64, Isometry2<f64>)>,
+    /// The people.
+    pub people: Vec<Seen>,
     /// Who stands together, where somebody has said; members need not be among the people.
     pub truth: Option<Vec<BTreeSet<u64>>>,
+}
+
+/// A person in a frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Seen {
+    /// The name, a number in the file.
+    pub id: u64,
+    /// Where the person stands and faces, world frame.
+    pub pose: Isometry2<f64>,
+    /// What the person does, such as `cooking`, where somebody has said.
+    pub activity: Option<String>,
+    /// What the person feels and wants, such as `emotional_state=happy`.
+    pub features: Option<String>,
+    /// What the robot does with the person, such as `escort`.
+    pub task: Option<String>,
 }
 
 /// One scene with a robot at the origin.
@@ -86,10 +101,14 @@ struct PersonRecord {
     x_m: f64,
     y_m: f64,
     theta_rad: f64,
+    activity: Option<String>,
+    features: Option<String>,
+    task: Option<String>,
 }
 
 /// Reads a recording: JSON with `frames`, each `{"t", "people": [{"id", "x_m", "y_m", "theta_rad"}],
-/// "groups": [[id, ...]]}`; `groups` may be missing. Metres, radians counter-clockwise from +x.
+/// "groups": [[id, ...]]}`; `groups` may be missing, and of people the texts `activity`, `features` and
+/// `task`. Metres, radians counter-clockwise from +x.
 ///
 /// # Errors
 /// [`ScenesError`].
@@ -99,20 +118,20 @@ pub fn parse_recording(text: &str) -> Result<Recording, ScenesError> {
     for (index, frame) in file.frames.into_iter().enumerate() {
         let mut seen = BTreeSet::new();
         let mut people = Vec::with_capacity(frame.people.len());
-        for PersonRecord {
-            id,
-            x_m,
-            y_m,
-            theta_rad,
-        } in frame.people
-        {
-            if !seen.insert(id) {
+        for person in frame.people {
+            if !seen.insert(person.id) {
                 return Err(ScenesError::Twice {
                     frame: index,
-                    person: id,
+                    person: person.id,
                 });
             }
-            people.push((id, Isometry2::new(Vector2::new(x_m, y_m), theta_rad)));
+            people.push(Seen {
+                id: person.id,
+                pose: Isometry2::new(Vector2::new(person.x_m, person.y_m), person.theta_rad),
+                activity: person.activity,
+                features: person.features,
+                task: person.task,
+            });
         }
         frames.push(Frame {
             time: frame.t,
@@ -238,14 +257,19 @@ mod tests {
     #[test]
     fn a_recording_has_frames_and_the_truth_where_known() {
         let text = r#"{"dataset": "two", "frames": [
-            {"t": 1, "people": [{"id": 4, "x_m": 1.5, "y_m": -2, "theta_rad": 0.5}], "groups": [[4, 9]]},
+            {"t": 1, "people": [{"id": 4, "x_m": 1.5, "y_m": -2, "theta_rad": 0.5,
+              "features": "role=staff"}], "groups": [[4, 9]]},
             {"t": 3.5, "people": []}]}"#;
         let recording = parse_recording(text).unwrap();
         assert_eq!(recording.frames.len(), 2);
-        let (name, pose) = &recording.frames[0].people[0];
+        let seen = &recording.frames[0].people[0];
         assert_eq!(
-            (*name, pose.translation.vector),
+            (seen.id, seen.pose.translation.vector),
             (4, Vector2::new(1.5, -2.0))
+        );
+        assert_eq!(
+            (seen.features.as_deref(), &seen.task),
+            (Some("role=staff"), &None)
         );
         assert_eq!(
             recording.frames[0].truth,

@@ -5,11 +5,11 @@
 use crate::metrics::mapped;
 use crate::scenario::Scenario;
 use crate::scenes::Frame;
-use agents::social_mapping::groups::{Grouping, TooManyPeople};
-use agents::social_mapping::scene::{Activity, BODY_RADIUS, Person, SceneError};
+use agents::social_mapping::scene::{Activity, BODY_RADIUS, Manner, Person, Rejection, SceneError};
 use agents::social_mapping::{ConfigError, SocialConfig, SocialMapper, SocialScene, Update};
 use dsr::Time;
 use nalgebra::{Isometry2, Point2, Vector2};
+use std::collections::BTreeMap;
 
 /// Around the people of a recording, metres: as far as social space reaches.
 const AROUND: f64 = 2.5;
@@ -29,15 +29,6 @@ pub struct Situation {
     pub rooms: Vec<Vec<Point2<f64>>>,
 }
 
-/// What social mapping makes of a situation.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Mapped {
-    /// The grid, the polylines, R(t), and what was left out.
-    pub update: Update,
-    /// Who stands together, as indices of the update's people.
-    pub groups: Vec<Vec<usize>>,
-}
-
 /// Why a situation cannot be mapped.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SituationError {
@@ -50,25 +41,42 @@ pub enum SituationError {
     /// The scene itself is.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// Too many people to look for groups among.
-    #[error(transparent)]
-    People(#[from] TooManyPeople),
 }
 
 impl Situation {
-    /// A frame of a recording, on an open floor around its people.
-    pub fn of_frame(name: &str, frame: &Frame) -> Self {
-        let places = || frame.people.iter().map(|(_, pose)| pose.translation.vector);
+    /// A frame of a recording, on an open floor around its people. Features that `config` does not
+    /// know are left out.
+    pub fn of_frame(name: &str, frame: &Frame, config: &SocialConfig) -> Self {
+        let places = || frame.people.iter().map(|one| one.pose.translation.vector);
         let low = places().reduce(|a, b| a.inf(&b)).unwrap_or_default();
         let high = places().reduce(|a, b| a.sup(&b)).unwrap_or_default();
         let margin = Vector2::repeat(AROUND);
         let (low, high) = (low - margin, high + margin);
-        let people = frame.people.iter().map(|(name, pose)| Person {
-            name: name.to_string(),
-            world_from_person: *pose,
-            velocity: Vector2::zeros(),
-            radius: BODY_RADIUS,
-        });
+        let mut rejected = Vec::new();
+        let mut people = Vec::with_capacity(frame.people.len());
+        for one in &frame.people {
+            let name = one.id.to_string();
+            let features = config
+                .features
+                .parse(one.features.as_deref().unwrap_or_default());
+            let features = features.unwrap_or_else(|error| {
+                let name = name.clone();
+                rejected.push(Rejection::PersonFeatures { name, error });
+                BTreeMap::new()
+            });
+            people.push(Person {
+                name,
+                world_from_person: one.pose,
+                velocity: Vector2::zeros(),
+                radius: BODY_RADIUS,
+                manner: Manner {
+                    activity: one.activity.clone(),
+                    features,
+                    task: one.task.clone(),
+                    room: None,
+                },
+            });
+        }
         Self {
             name: name.to_owned(),
             moment: format!("t = {}", frame.time),
@@ -77,7 +85,8 @@ impl Situation {
                 bounds: [low.x, low.y, high.x, high.y],
                 robot_radius: BODY_RADIUS,
                 social: true,
-                people: people.collect(),
+                people,
+                rejected,
                 ..SocialScene::default()
             },
             rooms: Vec::new(),
@@ -91,8 +100,15 @@ impl Situation {
             world_from_person: person.pose,
             velocity: Vector2::zeros(),
             radius: person.radius,
+            manner: Manner {
+                room: scenario
+                    .find_room(person.pose.translation.vector.into())
+                    .map(|room| room.name.clone()),
+                ..Manner::default()
+            },
         });
-        let activities = scenario.activities.iter().map(|activity| Activity {
+        let held = scenario.activities.iter().filter(|one| !one.cancelled);
+        let activities = held.map(|activity| Activity {
             object: activity.object.clone(),
             start: activity.start,
             end: activity.end,
@@ -119,18 +135,16 @@ impl Situation {
         }
     }
 
-    /// Maps it. Groups are found, and whoever stands together has the space between them.
+    /// Maps it; the mapper has its layers. Nobody has watched who talks with whom, so whoever stands in
+    /// one group is taken to.
     ///
     /// # Errors
     /// [`SituationError`].
-    pub fn map(
-        &self,
-        config: &SocialConfig,
-        grouping: &Grouping,
-    ) -> Result<Mapped, SituationError> {
-        let people: Vec<&Person> = self.scene.people.iter().collect();
+    pub fn map(&self, config: &SocialConfig) -> Result<(Update, SocialMapper), SituationError> {
+        let people = &self.scene.people;
         let poses: Vec<Isometry2<f64>> = people.iter().map(|p| p.world_from_person).collect();
-        let groups = grouping.groups(&poses)?;
+        // More people than can be searched are in no group; the update reports that.
+        let groups = config.grouping.groups(&poses).unwrap_or_default();
         let mut scene = self.scene.clone();
         for group in &groups {
             for (at, one) in group.iter().enumerate() {
@@ -141,20 +155,12 @@ impl Situation {
         }
         let mut mapper = SocialMapper::new(config.clone())
             .map_err(|problems| SituationError::Config { problems })?;
-        let update = mapper.update(self.now, &scene)?;
-        // The update leaves out whose pose is not finite; so do groups.
-        let kept: Vec<&str> = update.people.iter().map(|p| p.name.as_str()).collect();
-        let place = |index: &usize| kept.iter().position(|name| *name == people[*index].name);
-        let groups = groups
-            .iter()
-            .map(|group| group.iter().filter_map(place).collect())
-            .collect();
-        Ok(Mapped { update, groups })
+        Ok((mapper.update(self.now, &scene)?, mapper))
     }
 }
 
-/// `HH:MM:SS`.
-fn time_of_day(time: Time) -> String {
+/// A time of its day, `HH:MM:SS`.
+pub fn time_of_day(time: Time) -> String {
     const DAY: i64 = 86_400;
     let seconds = time.nanoseconds().div_euclid(1_000_000_000).rem_euclid(DAY);
     let (hours, minutes) = (seconds / 3600, seconds / 60 % 60);
@@ -164,6 +170,7 @@ fn time_of_day(time: Time) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scenes::Seen;
     use agents::grid::{BLOCKED, FREE};
 
     fn at(x: f64, y: f64, heading: f64) -> Isometry2<f64> {
@@ -179,25 +186,43 @@ mod tests {
 
     #[test]
     fn a_frame_is_mapped_with_its_groups() {
-        let frame = Frame {
+        let seen = |id, pose| Seen {
+            id,
+            pose,
+            activity: None,
+            features: None,
+            task: None,
+        };
+        let mut frame = Frame {
             time: 4.0,
             people: vec![
-                (7, at(0.0, 0.0, 0.0)),
-                (9, at(1.4, 0.0, std::f64::consts::PI)),
-                (2, at(0.0, 4.0, 0.0)),
+                seen(7, at(0.0, 0.0, 0.0)),
+                seen(9, at(1.4, 0.0, std::f64::consts::PI)),
+                seen(2, at(0.0, 4.0, 0.0)),
             ],
             truth: None,
         };
-        let situation = Situation::of_frame("two", &frame);
-        let mapped = situation
-            .map(&SocialConfig::default(), &Grouping::default())
-            .unwrap();
-        assert_eq!(mapped.groups, [[0, 1]]);
-        assert_eq!(mapped.update.rejected, []);
-        let grid = &mapped.update.grid;
+        let config = SocialConfig::default();
+        let map = |frame: &Frame| Situation::of_frame("two", frame, &config).map(&config);
+        let (update, _) = map(&frame).unwrap();
+        assert_eq!(update.groups.len(), 1);
+        assert_eq!(update.groups[0].members, ["7", "9"]);
+        assert_eq!(update.rejected, []);
+        let grid = &update.grid;
         let cost = |x, y| grid.cost(grid.cell_at(Point2::new(x, y)).unwrap());
         assert!((cost(0.72, 0.0) - 4.0).abs() < 1e-6);
         assert!(cost(0.0, 4.0) >= BLOCKED);
         assert!((cost(3.0, 2.5) - FREE).abs() < 1e-6);
+
+        frame.people[2].activity = Some("in_the_bathroom".into());
+        frame.people[0].features = Some("emotional_state=merry".into());
+        let (update, _) = map(&frame).unwrap();
+        assert!((update.people[2].shape.rear - 2.5).abs() < 1e-12);
+        let said: Vec<String> = update.rejected.iter().map(ToString::to_string).collect();
+        assert_eq!(said.len(), 1);
+        assert!(
+            said[0].starts_with("person 7 has no features: `merry`"),
+            "{said:?}"
+        );
     }
 }

@@ -22,6 +22,7 @@ fn map(scenario: &Scenario) -> CostGrid {
         world_from_person: Isometry2::new(person.position.coords, person.heading),
         velocity: person.velocity,
         radius: person.radius,
+        manner: scene::Manner::default(),
     });
     let objects = scenario.objects.iter().map(|object| scene::Object {
         name: object.name.clone(),

@@ -1,5 +1,6 @@
 //! The flags of `cortex social` and `cortex experiment`. Parsing a flag does nothing but parse it.
 
+use agents::social_mapping::Layer;
 use agents::social_mapping::groups::Method;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand};
@@ -38,6 +39,18 @@ pub(crate) enum SocialAction {
         #[arg(long)]
         json: bool,
     },
+    /// Put a schedule into effect in a running system: what is done with which object and when
+    #[command(
+        after_help = "Afterwards the activities of the graph are those of the file.\n\n\
+        Example:\n  cortex social schedule scenarios/care-centre/schedule.toml"
+    )]
+    Schedule {
+        /// Tables [[activity]] (TOML)
+        file: PathBuf,
+        /// The instance of the running system
+        #[arg(long, value_name = "I", default_value = "default")]
+        instance: String,
+    },
     /// Draw people's density with contours, headings, groups and the spaces of objects
     #[command(
         after_help = "Example:\n  cortex social density scenarios/care-centre --at 09:40 --out density.png"
@@ -46,9 +59,16 @@ pub(crate) enum SocialAction {
     /// Draw what places cost the robot, or write that as a ROS map (.yaml and .pgm)
     #[command(
         after_help = "Examples:\n  cortex social map scenarios/care-centre --out costs.png\n  \
-        cortex social map recording.json --at 12 --out costs.yaml"
+        cortex social map recording.json --at 12 --out costs.yaml\n  \
+        cortex social map scenarios/care-centre --layer inflation --out walls.png"
     )]
-    Map(SocialPicture),
+    Map {
+        #[command(flatten)]
+        picture: SocialPicture,
+        /// How much of the map, each built on those before but for the social one
+        #[arg(long, value_name = "L", default_value = Layer::default().name(), value_parser = layer())]
+        layer: Layer,
+    },
 }
 
 #[derive(Debug, Clone, Args)]
@@ -62,9 +82,12 @@ pub(crate) struct SocialPicture {
     /// Where to; the ending decides what
     #[arg(long, value_name = "FILE")]
     pub(crate) out: PathBuf,
-    /// How groups are found
-    #[arg(long, value_name = "M", default_value = Method::default().name(), value_parser = method())]
-    pub(crate) method: Method,
+    /// Figures of social mapping: a file with a table [social] [default: those of the scenario]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) settings: Option<PathBuf>,
+    /// How groups are found [default: as the figures say]
+    #[arg(long, value_name = "M", value_parser = method())]
+    pub(crate) method: Option<Method>,
 }
 
 #[derive(Debug, Clone, Args)]
@@ -74,6 +97,13 @@ pub(crate) struct Experiment {
     /// For machines
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+fn layer() -> impl TypedValueParser<Value = Layer> {
+    PossibleValuesParser::new(Layer::ALL.map(Layer::name)).map(|name| {
+        let named = |layer: &Layer| layer.name() == name;
+        Layer::ALL.into_iter().find(named).unwrap_or_default()
+    })
 }
 
 fn method() -> impl TypedValueParser<Value = Method> {

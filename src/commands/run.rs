@@ -5,7 +5,6 @@ use crate::cli::Run as Arguments;
 use crate::conduct::{Recording, Settings, conduct};
 use crate::progress::Progress;
 use crate::{Answer, Failure};
-use agents::social_mapping::config::SocialConfig;
 use executive::{Mission, MissionStep, StepStatus};
 use scenarios::metrics::{Metrics, ObjectSpace, measure, object_spaces};
 use scenarios::picture::{Picture, Run, png};
@@ -39,7 +38,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     if let Some(folder) = &arguments.state {
         super::store::check_state(folder, &scenario, schema)?;
     }
-    let spaces = object_spaces(&scenario, &SocialConfig::default()).map_err(Failure::input)?;
+    let spaces = object_spaces(&scenario, &scenario.social).map_err(Failure::input)?;
     let folder = arguments
         .report
         .clone()

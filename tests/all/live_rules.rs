@@ -39,8 +39,9 @@ impl Drop for Member {
 /// The care centre with other rules and a mission of its own.
 fn scenario(folder: &Path, rules: &str, goal: &str) {
     let care = root().join("scenarios/care-centre");
-    let text = fs::read_to_string(care.join("scenario.toml")).unwrap();
-    fs::write(folder.join("scenario.toml"), text).unwrap();
+    for file in ["scenario.toml", "schedule.toml"] {
+        fs::copy(care.join(file), folder.join(file)).unwrap();
+    }
     fs::write(folder.join("rules.aggl"), rules).unwrap();
     fs::create_dir(folder.join("missions")).unwrap();
     fs::write(folder.join("missions/invite.aggt"), goal).unwrap();

@@ -243,6 +243,17 @@ fn the_live_graph_is_shown_from_another_terminal() {
     let (costs, rest) = bytes.as_chunks::<4>();
     assert!(!costs.is_empty() && rest.is_empty());
     assert!(costs.iter().all(|cost| f32::from_le_bytes(*cost) >= 1.0));
+    let dirty = [
+        "graph",
+        "get",
+        "world.social_grid_dirty",
+        "--instance",
+        &name,
+    ];
+    let dirty = String::from_utf8(Program::run(&dirty).stdout).unwrap();
+    let dirty: Value = serde_json::from_str(&dirty).unwrap();
+    let dirty: [f64; 4] = serde_json::from_value(dirty["value"].clone()).unwrap();
+    assert!(dirty[1] * dirty[3] <= costs.len() as f64, "{dirty:?}");
     let json = Program::run(&["graph", "export", "json", "--instance", &name]);
     let json: Value = serde_json::from_slice(&json.stdout).unwrap();
     assert_eq!(json["format"], "dsr/1");
@@ -259,7 +270,7 @@ fn the_live_graph_is_shown_from_another_terminal() {
 #[test]
 fn a_broken_scenario_is_told_with_line_and_column() {
     let folder = tempfile::tempdir().unwrap();
-    for file in ["scenario.toml", "rules.aggl"] {
+    for file in ["scenario.toml", "schedule.toml", "rules.aggl"] {
         let text = fs::read_to_string(crate::support::root().join(CARE_CENTRE).join(file)).unwrap();
         fs::write(folder.path().join(file), text).unwrap();
     }

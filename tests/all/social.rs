@@ -1,11 +1,12 @@
 //! `cortex social` and `cortex experiment` as their users meet them: groups and their scores,
 //! comfort, pictures, tables, and what is wrong with what they are given.
 
-use crate::support::Program;
+use crate::support::{Program, Run, root, within};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 use std::fs;
 use std::path::Path;
+use std::time::Duration;
 use tempfile::TempDir;
 
 /// Exit code, standard output and standard error.
@@ -176,6 +177,153 @@ fn a_situation_is_drawn_and_written_as_a_map() {
 }
 
 #[test]
+fn figures_and_what_is_known_of_people_show_in_the_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut escorted = person(1, 0.0, 0.0, 0.0);
+    escorted["task"] = "guide".into();
+    escorted["activity"] = "gardening".into();
+    let mut other = person(2, 6.0, 0.0, PI);
+    other["features"] = "role=staff".into();
+    let frames = json!({"frames": [{"t": 0, "people": [escorted, other]}]});
+    let file = save(&folder, "people.json", &frames.to_string());
+    let picture = folder.path().join("density.svg");
+    let draw = |rest: &[&str]| {
+        let to = [
+            "social",
+            "density",
+            &file,
+            "--out",
+            picture.to_str().unwrap(),
+        ];
+        let (code, out, err) = cortex(&[&to[..], rest].concat());
+        assert_eq!(code, 0, "{err}");
+        (out, fs::read_to_string(&picture).unwrap())
+    };
+    let (told, plain) = draw(&[]);
+    assert!(
+        told.contains("person 1: there is no activity `gardening`; there are cooking"),
+        "{told}"
+    );
+    assert!(
+        told.contains("person 1: there is no task `guide`; there are approach"),
+        "{told}"
+    );
+    assert!(!plain.contains("cooperation zone"));
+    let settings = "[social]\n\
+        activities.gardening = { front = 1.5, left = 1.0, rear = 0.8, right = 1.0 }\n\
+        cooperation.guide = [{ direction = 1.57, opening = 1.0 }]\n";
+    let settings = save(&folder, "social.toml", settings);
+    let (told, drawn) = draw(&["--settings", &settings]);
+    assert_eq!(told.lines().count(), 1, "{told}");
+    assert!(drawn.contains("cooperation zone"));
+    let wrong = save(&folder, "wrong.toml", "[social]\nresolutoin = 1\n");
+    let (code, _, err) = cortex(&[
+        "social",
+        "map",
+        &file,
+        "--out",
+        "map.png",
+        "--settings",
+        &wrong,
+    ]);
+    assert_eq!(code, 2);
+    assert!(
+        err.contains("wrong.toml:2") && err.contains("resolutoin"),
+        "{err}"
+    );
+}
+
+#[test]
+fn layers_of_the_map_are_drawn_one_by_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = recording(&folder, false);
+    let blocked = |layer: &str| {
+        let out = folder.path().join("layer.yaml");
+        let (code, _, err) = cortex(&[
+            "social",
+            "map",
+            &file,
+            "--layer",
+            layer,
+            "--out",
+            out.to_str().unwrap(),
+        ]);
+        assert_eq!(code, 0, "{err}");
+        let image = fs::read(out.with_extension("pgm")).unwrap();
+        let cells = image.splitn(4, |byte| *byte == b'\n').nth(3).unwrap();
+        cells.split(|grey| *grey == 0).count() - 1
+    };
+    // Three bodies of 0.25 m, which the filter takes out; with a robot as large; with intimate space.
+    let [bodies, filtered, inflated, master] =
+        ["obstacles", "people_filter", "inflation", "master"].map(blocked);
+    assert!((50..100).contains(&bodies), "{bodies}");
+    assert_eq!((filtered, inflated), (0, 0));
+    assert!(master > 2 * bodies, "{master}");
+    assert_eq!(master, blocked("social"));
+}
+
+#[test]
+fn a_schedule_is_put_into_effect_while_the_system_runs_and_groups_are_in_its_graph() {
+    const PATIENCE: Duration = Duration::from_mins(1);
+    let mut run = Run::new("schedule", &["scenarios/care-centre", "--no-baseline"]).start();
+    run.until("mission invite is running");
+    let name = run.instance_name().to_owned();
+    let get = |path: &str| {
+        let (_, out, _) = cortex(&["graph", "get", path, "--instance", &name]);
+        out.trim().to_owned()
+    };
+    let becomes = |path: &str, value: &str| {
+        let reached = within(PATIENCE, || (get(path) == value).then_some(()));
+        assert!(reached.is_some(), "{path} is {}, not {value}", get(path));
+    };
+    becomes("day_tv.usage", "3.5");
+    let folder = tempfile::tempdir().unwrap();
+    let today = fs::read_to_string(root().join("scenarios/care-centre/schedule.toml")).unwrap();
+    let cancelled = today.replace("end = \"11:00\"", "end = \"11:00\"\ncancelled = true");
+    assert_ne!(cancelled, today);
+    let put = |text: &str| {
+        let file = save(&folder, "today.toml", text);
+        cortex(&["social", "schedule", &file, "--instance", &name])
+    };
+    let (code, out, err) = put(&cancelled);
+    assert_eq!(code, 0, "{err}");
+    assert!(
+        out.contains("at day_tv, cancelled (changed)") && out.contains("(as before)"),
+        "{out}"
+    );
+    becomes("day_tv.usage", "1.5");
+    let (code, _, err) = put(&today.replace("11:00", "09:00"));
+    assert_eq!(code, 2);
+    assert!(
+        err.contains("today.toml:") && err.contains("ends before it starts"),
+        "{err}"
+    );
+    let (code, _, err) = cortex(&[
+        "graph",
+        "set",
+        "news.cancelled",
+        "false",
+        "--instance",
+        &name,
+    ]);
+    assert_eq!(code, 0, "{err}");
+    becomes("day_tv.usage", "3.5");
+    let group = within(PATIENCE, || {
+        let (code, out, _) = cortex(&["graph", "show", "group_1", "--instance", &name]);
+        (code == 0).then_some(out)
+    });
+    let group = group.expect("a group");
+    assert!(group.contains("personal_zone"), "{group}");
+    let joined = within(PATIENCE, || {
+        let (_, out, _) = cortex(&["graph", "show", "person", "--instance", &name]);
+        out.contains("-member_of-> group_").then_some(())
+    });
+    assert!(joined.is_some(), "nobody is a member of a group");
+    run.interrupt();
+    assert_eq!(run.exit_code(), 1);
+}
+
+#[test]
 fn what_cannot_be_used_is_refused_with_what_could() {
     let folder = tempfile::tempdir().unwrap();
     let file = recording(&folder, true);
@@ -197,6 +345,10 @@ fn what_cannot_be_used_is_refused_with_what_could() {
         (
             &["social", "map", &file, "--at", "noon", "--out", "map.svg"],
             "not a time",
+        ),
+        (
+            &["social", "schedule", &broken, "--instance", "nobody-here"],
+            "no instance `nobody-here` is running",
         ),
         (&["experiment", "fd-tabel1"], "did you mean `fd-table1`?"),
     ] {

@@ -82,7 +82,9 @@ impl Settled {
 
     /// Marks the cells about which the grid says nothing but that `person` is there.
     fn hide(&mut self, newest: &CostGrid, person: &Person, known: bool) {
-        let shape = AsymmetricGaussian::HALL.walking(person.velocity.norm());
+        let shape = AsymmetricGaussian::HALL
+            .four_sided()
+            .walking(person.velocity.norm());
         let reach = HIDDEN.sqrt() * shape.front;
         let position = person.position();
         let cell = |offset: f64, end: usize| {

@@ -83,6 +83,15 @@ pub enum Passage {
 }
 
 impl Passage {
+    /// Its name in the graph.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Free => "free",
+            Self::Adapted { .. } => "adapted",
+            Self::Blocked => "blocked",
+        }
+    }
+
     /// Whether the robot passes between the person and the wall.
     pub fn is_passable(self) -> bool {
         self != Self::Blocked

@@ -5,8 +5,8 @@
 
 use super::gaussian::AsymmetricGaussian;
 use super::groups::{Grouping, TooManyPeople};
-use super::layers::distance_to_segment;
 use super::scene::Wall;
+use super::stamps::distance_to_segment;
 use nalgebra::{Isometry2, Point2};
 use serde::{Deserialize, Serialize};
 

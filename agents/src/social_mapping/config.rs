@@ -1,7 +1,12 @@
 //! The figures of the social map. This file owns their defaults, and guarantees that figures which
 //! pass [`SocialConfig::problems`] make a map of every sound scene.
 
+use super::adaptation::WallAdaptation;
+use super::features::Features;
+use super::four_sided::FourSided;
+use super::groups::Grouping;
 use super::object_space::{Space, UsageCurve};
+use super::personal::{self, CooperationZone, MOST_ZONES};
 use super::zones::Proxemics;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -15,7 +20,7 @@ pub struct SocialConfig {
     /// People's density and zones. Preset `hall` with levels .9/.5/.1.
     pub proxemics: Proxemics,
     /// Whether the space of walking people reaches further ahead on the grid, by
-    /// [`AsymmetricGaussian::walking`](super::AsymmetricGaussian::walking). Polylines and metrics keep the standing shape.
+    /// [`FourSided::walking`]. Polylines and metrics keep the standing shape.
     pub stretch: bool,
     /// What a place right beside an obstacle costs more than a free one. The default stays below
     /// the cheapest space of an object, so the order of READING.md item 7 holds; 0 turns it off.
@@ -36,6 +41,21 @@ pub struct SocialConfig {
     pub usage_of: BTreeMap<String, UsageCurve>,
     /// Points of a person's polylines.
     pub contour_points: usize,
+    /// Widths of people who do something in particular, by its name (AP Fig. 2).
+    pub activities: BTreeMap<String, FourSided>,
+    /// What is usually done in a room, by the names of rooms and activities: counts for whoever is in it and of
+    /// whom nothing else is known (AP 2.1).
+    pub activity_in: BTreeMap<String, String>,
+    /// Socialization features (TG 3.3.1).
+    pub features: Features,
+    /// Whether and how personal space gives way to walls (FD IV-C); not by default.
+    pub walls: Option<WallAdaptation>,
+    /// Where people want the robot, by what it does with them (AP 2.2); at most two zones each.
+    pub cooperation: BTreeMap<String, Vec<CooperationZone>>,
+    /// How groups are found.
+    pub grouping: Grouping,
+    /// Whether a group has a space of its own on the grid, beside its members' (TG 3.3.4).
+    pub group_space: bool,
 }
 
 impl Default for SocialConfig {
@@ -54,6 +74,13 @@ impl Default for SocialConfig {
             usage: UsageCurve::default(),
             usage_of: BTreeMap::new(),
             contour_points: 24,
+            activities: personal::activities(),
+            activity_in: BTreeMap::new(),
+            features: Features::default(),
+            walls: None,
+            cooperation: personal::cooperation(),
+            grouping: Grouping::default(),
+            group_space: false,
         }
     }
 }
@@ -121,6 +148,41 @@ impl SocialConfig {
             let requirement = "needs finite lengths greater than 0 and an opening below pi";
             (format!("spaces.{class}"), space.is_valid(), requirement)
         }));
+        checks.extend(self.activities.iter().map(|(name, shape)| {
+            let requirement = "needs four finite widths greater than 0";
+            (format!("activities.{name}"), shape.is_valid(), requirement)
+        }));
+        checks.extend(self.activity_in.iter().map(|(room, activity)| {
+            let known = self.activities.contains_key(activity);
+            (
+                format!("activity_in.{room}"),
+                known,
+                "needs the name of an activity",
+            )
+        }));
+        checks.extend(self.cooperation.iter().map(|(task, zones)| {
+            let valid = zones.len() <= MOST_ZONES && zones.iter().all(CooperationZone::is_valid);
+            let requirement =
+                "needs at most two zones, each with an opening above 0 and at most 2 pi";
+            (format!("cooperation.{task}"), valid, requirement)
+        }));
+        checks.extend([
+            (
+                "features".to_owned(),
+                self.features.is_valid(),
+                "needs levels above 0 and at most 1, and influences from -1 to 1",
+            ),
+            (
+                "walls".to_owned(),
+                self.walls.is_none_or(|walls| walls.is_valid()),
+                "needs lengths that are finite, least <= most above the margin, and an exponent below 0",
+            ),
+            (
+                "grouping".to_owned(),
+                self.grouping.is_valid(),
+                "needs finite figures, and lengths greater than 0",
+            ),
+        ]);
         checks
             .into_iter()
             .filter(|(_, sound, _)| !sound)
@@ -142,9 +204,16 @@ mod tests {
         };
         config.proxemics.levels.personal = 0.95;
         config.spaces.insert("bath".into(), Space::Margin(f64::NAN));
+        config.activity_in.insert("hall".into(), "dancing".into());
         let problems = config.problems();
         let fields: Vec<_> = problems.iter().map(|p| p.field.as_str()).collect();
-        assert_eq!(fields, ["resolution", "proxemics.levels", "spaces.bath"]);
+        let expected = [
+            "resolution",
+            "proxemics.levels",
+            "spaces.bath",
+            "activity_in.hall",
+        ];
+        assert_eq!(fields, expected);
         assert_eq!(SocialMapper::new(config).unwrap_err(), problems);
     }
 }

@@ -94,8 +94,13 @@ impl Kernel {
         let y = row + 0.5 - self.centre[1];
         let along = x * self.ahead[0] + y * self.ahead[1];
         let across = y * self.ahead[0] - x * self.ahead[1];
-        let along = along * if along >= 0.0 { front } else { rear };
-        let across = across * if across >= 0.0 { left } else { right };
+        // Of the two parts of each sum one is zero: without a branch, for vector units.
+        let ahead = if along > 0.0 { along } else { 0.0 };
+        let behind = if along < 0.0 { along } else { 0.0 };
+        let leftwards = if across > 0.0 { across } else { 0.0 };
+        let rightwards = if across < 0.0 { across } else { 0.0 };
+        let along = ahead * front + behind * rear;
+        let across = leftwards * left + rightwards * right;
         along * along + across * across
     }
 
@@ -108,17 +113,20 @@ impl Kernel {
 /// `exp(-squared / 2)` to within 3e-7 for 0 to 30, in operations that vector units have.
 #[inline]
 fn density(squared: f32) -> f32 {
-    // 2^t with t = whole + part, part in [-1/2, 1/2]: the whole goes into the exponent's bits.
+    // 2^t with t = whole + part, part in [-1/2, 1/2]: the whole goes into the exponent's bits. Adding this
+    // number leaves the whole in the last bits of the sum.
+    const ROUND: f32 = 12_582_912.0;
     let t = squared * (-0.5 * std::f32::consts::LOG2_E);
-    let whole = (t - 0.5) as i32;
-    let part = t - whole as f32;
+    let shifted = t + ROUND;
+    let part = t - (shifted - ROUND);
+    let whole = shifted.to_bits().wrapping_sub(ROUND.to_bits());
     // Taylor's series of 2^part.
     let p = part * std::f32::consts::LN_2;
     let series = 1.0
         + p * (1.0
             + p * (0.5
                 + p * (1.0 / 6.0 + p * (1.0 / 24.0 + p * (1.0 / 120.0 + p * (1.0 / 720.0))))));
-    f32::from_bits(((whole + 127) << 23) as u32) * series
+    f32::from_bits(whole.wrapping_add(127) << 23) * series
 }
 
 impl DensityField {
@@ -155,11 +163,9 @@ impl DensityField {
             .iter_mut()
             .zip(field.deviations.iter().zip(&field.owners))
         {
-            *density = if *owner == NOBODY {
-                0.0
-            } else {
-                self::density(*squared)
-            };
+            // No ones where the cell is nobody's: as a choice, it would be a branch.
+            let mine = u32::from(*owner != NOBODY).wrapping_neg();
+            *density = f32::from_bits(self::density(*squared).to_bits() & mine);
         }
         field
     }
@@ -263,12 +269,14 @@ impl DensityField {
             let line = row * self.width;
             let deviations = &mut self.deviations[line + start..line + end];
             let owners = &mut self.owners[line + start..line + end];
-            for (at, (squared, owner)) in deviations.iter_mut().zip(owners).enumerate() {
-                let is = kernel.deviation((start + at) as f32, row as f32);
-                // Without a branch, so that it is done for several cells at once.
-                let mine = is < *squared;
-                *squared = if mine { is } else { *squared };
-                *owner = if mine { index } else { *owner };
+            // Columns as i32, which vector units turn into numbers; a usize they do not.
+            let cells = ((start as u32).cast_signed()..).zip(deviations.iter_mut().zip(owners));
+            for (column, (squared, owner)) in cells {
+                let is = kernel.deviation(column as f32, row as f32);
+                // All ones where the cell changes hands: as a choice, it would be a branch.
+                let mine = u32::from(is < *squared).wrapping_neg();
+                *owner = (index & mine) | (*owner & !mine);
+                *squared = if is < *squared { is } else { *squared };
             }
         }
     }

@@ -6,15 +6,11 @@ use super::four_sided::FourSided;
 use nalgebra::{Isometry2, Point2};
 use serde::{Deserialize, Serialize};
 
-/// How long a walking person's way ahead counts as theirs, seconds. With the `hall` widths a runner
-/// (2 m/s) gets the front width 2.0 m that AP prints for running.
-pub const LOOK_AHEAD: f64 = 0.5;
-/// Speeds above this stretch a space no further, m/s: faster "people" are tracking errors.
-pub const FASTEST: f64 = 2.0;
-
 /// The standard deviations of a person's space to the front, the sides and the rear, metres.
+///
+/// In configuration also the name of a preset: `hall` or `printed`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(try_from = "Spelled")]
 pub struct AsymmetricGaussian {
     /// Along the heading.
     pub front: f64,
@@ -22,6 +18,42 @@ pub struct AsymmetricGaussian {
     pub side: f64,
     /// Against the heading.
     pub rear: f64,
+}
+
+/// How widths are written: by name, or one by one.
+#[derive(Deserialize)]
+#[serde(
+    untagged,
+    expecting = "`hall`, `printed`, or widths as { front = 1.0, side = 0.75, rear = 0.5 }"
+)]
+enum Spelled {
+    Preset(String),
+    Widths(Widths),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Widths {
+    front: f64,
+    side: f64,
+    rear: f64,
+}
+
+/// There are no widths of that name.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("there are no widths `{name}`; there are `hall` and `printed`")]
+pub struct UnknownPreset {
+    name: String,
+}
+
+impl TryFrom<Spelled> for AsymmetricGaussian {
+    type Error = UnknownPreset;
+    fn try_from(spelled: Spelled) -> Result<Self, UnknownPreset> {
+        match spelled {
+            Spelled::Preset(name) => Self::find_preset(&name).ok_or(UnknownPreset { name }),
+            Spelled::Widths(Widths { front, side, rear }) => Ok(Self { front, side, rear }),
+        }
+    }
 }
 
 impl AsymmetricGaussian {
@@ -85,18 +117,6 @@ impl AsymmetricGaussian {
     ) -> Vec<Point2<f64>> {
         self.four_sided().contour(world_from_person, level, points)
     }
-
-    /// The space of a person who walks with `forward_speed` along the heading, m/s: the front
-    /// grows by [`LOOK_AHEAD`] times the speed. AP updates the front width with the velocity and
-    /// prints no law; this one meets its figure for running. Who walks backwards keeps their space.
-    #[must_use]
-    pub fn walking(&self, forward_speed: f64) -> Self {
-        let stretch = LOOK_AHEAD * forward_speed.clamp(0.0, FASTEST);
-        Self {
-            front: self.front + stretch,
-            ..*self
-        }
-    }
 }
 
 impl Default for AsymmetricGaussian {
@@ -138,14 +158,13 @@ mod tests {
     }
 
     #[test]
-    fn a_runner_has_the_front_that_ap_prints() {
-        let runner = AsymmetricGaussian::HALL.walking(2.0);
-        assert!((runner.front - 2.0).abs() < 1e-12);
-        assert_eq!(
-            AsymmetricGaussian::HALL.walking(-1.0),
-            AsymmetricGaussian::HALL
-        );
-        assert_eq!(AsymmetricGaussian::HALL.walking(40.0), runner);
+    fn presets_have_names_in_configuration() {
+        let read = |text: &str| serde_json::from_str::<AsymmetricGaussian>(text);
+        assert_eq!(read("\"printed\"").unwrap(), AsymmetricGaussian::PRINTED);
+        let written = serde_json::to_string(&AsymmetricGaussian::HALL).unwrap();
+        assert_eq!(read(&written).unwrap(), AsymmetricGaussian::HALL);
+        let error = read("\"hal\"").unwrap_err().to_string();
+        assert!(error.contains("there are no widths `hal`"), "{error}");
     }
 
     #[test]

@@ -2,15 +2,21 @@
 //! names of the nodes and attributes, and guarantees that a turn in which nothing moved noticeably
 //! writes nothing.
 
+mod groups;
+mod read;
+
+use groups::GroupNodes;
+pub use groups::{EXTENT, GROUP, MEMBER};
+pub use read::scene;
+
+use super::adaptation::Passage;
 use super::config::{ConfigError, SocialConfig};
 use super::map::{ObjectUse, PersonSpaces, SocialMapper, Update};
-use super::object_space::Outline;
-use super::scene::{
-    Activity, BODY_RADIUS, Object, Person, Rejection, SceneError, SocialScene, Wall,
-};
-use crate::grid::CostGrid;
-use dsr::{Node, NodeId, Operation, Owner, Snapshot, Time, Transaction, Value};
-use nalgebra::{Point2, Vector2};
+use super::scene::{Rejection, SceneError};
+use crate::grid::Region;
+use crate::grid::shared::GridUpdate;
+use dsr::{Node, Operation, Owner, Snapshot, Time, Transaction, Value};
+use nalgebra::Point2;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -18,10 +24,17 @@ use std::sync::Arc;
 /// x, y, x, y, ... in the world frame, closed, the first point not repeated.
 /// (`social` alone is the world's switch, and an attribute has one kind in the whole graph.)
 pub const ZONES: [&str; 3] = ["intimate_zone", "personal_zone", "social_zone"];
+/// The attribute that says whether the robot passes between a person and the walls ahead, to the left, behind and to
+/// the right: `free`, `adapted` (the person's space gives way) or `blocked`. Absent where space does not give way to
+/// walls.
+pub const PASSAGES: &str = "passages";
 /// The attribute that holds the polyline of an object's space, like a person's.
 pub const SPACE: &str = "space";
 /// The attribute that holds R(t).
 pub const USAGE: &str = "usage";
+/// The world's attribute that holds the figures of the social map, as JSON: those of
+/// [`SocialConfig`], of which any may be missing. It may be set while running.
+pub const SETTINGS: &str = "social_settings";
 
 /// A polyline is written again when its person moved further than this, metres ...
 const MOVED: f64 = 0.05;
@@ -63,174 +76,6 @@ pub enum StepError {
     Scene(#[from] SceneError),
 }
 
-/// A number that may be absent, but if it is there must be one: NaN otherwise, which the mapper
-/// reports.
-fn number(node: &Node<'_>, name: &str, absent: f64) -> Result<f64, dsr::ReadError> {
-    let value = node.value(name)?;
-    Ok(value.map_or(absent, |value| value.as_f64().unwrap_or(f64::NAN)))
-}
-
-/// Two numbers, like [`number`].
-fn vector(node: &Node<'_>, name: &str, absent: f64) -> Result<Vector2<f64>, dsr::ReadError> {
-    let value = node.value(name)?;
-    Ok(match value.as_ref().map(Value::as_f64s) {
-        None => Vector2::repeat(absent),
-        Some(Some([x, y])) => Vector2::new(*x, *y),
-        Some(_) => Vector2::repeat(f64::NAN),
-    })
-}
-
-/// The social scene that the graph describes.
-///
-/// People and objects without a pose are nowhere and not in the scene. A person without `velocity`
-/// stands, one without `radius` has [`BODY_RADIUS`]. The robot's radius is that of the largest robot.
-/// A world without `social` is social. A circle's diameter is its larger `size`. An activity uses
-/// the objects its `uses` edges lead to and the one its `object` names.
-///
-/// # Errors
-/// [`ReadError`]: without a world with `bounds` and well-formed `walls`, and a robot with a `radius`,
-/// there is no map.
-pub fn scene(snapshot: &Snapshot) -> Result<SocialScene, ReadError> {
-    let world = snapshot.nodes_of("world").next().transpose()?;
-    let world = world.ok_or(ReadError::Missing { type_name: "world" })?;
-    let mut scene = SocialScene {
-        bounds: bounds(&world)?,
-        walls: walls(&world)?,
-        robot_radius: robot_radius(snapshot)?,
-        social: world
-            .value("social")?
-            .and_then(|value| value.as_bool())
-            .unwrap_or(true),
-        ..SocialScene::default()
-    };
-    let mut names: BTreeMap<NodeId, String> = BTreeMap::new();
-    for node in snapshot.nodes_of("person") {
-        let node = node?;
-        let Some(world_from_person) = snapshot.world_from(node.id())? else {
-            continue;
-        };
-        names.insert(node.id(), node.name()?);
-        scene.people.push(Person {
-            name: node.name()?,
-            world_from_person,
-            velocity: vector(&node, "velocity", 0.0)?,
-            radius: number(&node, "radius", BODY_RADIUS)?,
-        });
-    }
-    for node in snapshot.nodes_of("object") {
-        let node = node?;
-        let Some(world_from_object) = snapshot.world_from(node.id())? else {
-            continue;
-        };
-        let size = vector(&node, "size", f64::NAN)?;
-        let shape = node.value("shape")?;
-        let round = shape.as_ref().and_then(Value::as_str) == Some("circle");
-        scene.objects.push(Object {
-            name: node.name()?,
-            class: node.type_name().to_owned(),
-            world_from_object,
-            outline: if round {
-                Outline::Circle(size.max() / 2.0)
-            } else {
-                Outline::Rectangle(size)
-            },
-        });
-    }
-    if let Some(label) = snapshot.schema().find_label("interacting") {
-        for edge in snapshot.edges_of_label(label) {
-            let edge = edge?;
-            if let (Some(one), Some(other)) = (names.get(&edge.from), names.get(&edge.to)) {
-                scene.interactions.push((one.clone(), other.clone()));
-            }
-        }
-    }
-    read_activities(snapshot, &mut scene)?;
-    Ok(scene)
-}
-
-fn attribute_error(node: &Node<'_>, attribute: &'static str, expected: &'static str) -> ReadError {
-    match node.name() {
-        Ok(node) => ReadError::Attribute {
-            node,
-            attribute,
-            expected,
-        },
-        Err(error) => error.into(),
-    }
-}
-
-fn bounds(world: &Node<'_>) -> Result<[f64; 4], ReadError> {
-    let value = world.value("bounds")?;
-    let row = value
-        .as_ref()
-        .and_then(Value::as_f64s)
-        .and_then(|row| row.try_into().ok());
-    row.ok_or_else(|| attribute_error(world, "bounds", "four numbers: xmin, ymin, xmax, ymax"))
-}
-
-fn walls(world: &Node<'_>) -> Result<Vec<Wall>, ReadError> {
-    let Some(value) = world.value("walls")? else {
-        return Ok(Vec::new());
-    };
-    match value.as_f64s().map(<[f64]>::as_chunks::<4>) {
-        Some((walls, [])) => {
-            let wall = |&[ax, ay, bx, by]: &[f64; 4]| [Point2::new(ax, ay), Point2::new(bx, by)];
-            Ok(walls.iter().map(wall).collect())
-        }
-        _ => Err(attribute_error(
-            world,
-            "walls",
-            "numbers x1, y1, x2, y2 for each wall",
-        )),
-    }
-}
-
-fn robot_radius(snapshot: &Snapshot) -> Result<f64, ReadError> {
-    let mut largest: Option<f64> = None;
-    for robot in snapshot.nodes_of("robot") {
-        let robot = robot?;
-        let radius = robot.value("radius")?.and_then(|value| value.as_f64());
-        let radius = radius.ok_or_else(|| attribute_error(&robot, "radius", "a number"))?;
-        // Not `f64::max`, which would hide a NaN from the mapper's check.
-        largest = Some(largest.map_or(radius, |known| if radius < known { known } else { radius }));
-    }
-    largest.ok_or(ReadError::Missing { type_name: "robot" })
-}
-
-fn read_activities(snapshot: &Snapshot, scene: &mut SocialScene) -> Result<(), ReadError> {
-    let uses = snapshot.schema().find_label("uses");
-    for node in snapshot.nodes_of("activity") {
-        let node = node?;
-        let (start, end) = (
-            number(&node, "start", f64::NAN)?,
-            number(&node, "end", f64::NAN)?,
-        );
-        if !(start.is_finite() && end.is_finite()) {
-            scene.rejected.push(Rejection::ActivityTime {
-                activity: node.name()?,
-            });
-            continue;
-        }
-        let mut objects = Vec::new();
-        if let Some(Value::String(name)) = node.value("object")? {
-            objects.push(name);
-        }
-        for edge in uses.into_iter().flat_map(|label| node.out_edges_of(label)) {
-            if let Some(object) = snapshot.find_node(edge?.to)? {
-                objects.push(object.name()?);
-            }
-        }
-        objects.sort_unstable();
-        objects.dedup();
-        let (start, end) = (Time::from_seconds(start), Time::from_seconds(end));
-        let activities = objects
-            .into_iter()
-            .map(|object| Activity { object, start, end });
-        scene.activities.extend(activities);
-    }
-    Ok(())
-}
-
 /// What to write so that the graph shows `update`: a person's three polylines where the person
 /// moved by more than 5 cm or 5 degrees since they were written, an object's space where a point of
 /// it moved by more than 5 cm, R(t) to the hundredth. Polylines of whom the map does not have are
@@ -243,13 +88,19 @@ pub fn transaction(update: &Update, snapshot: &Snapshot) -> Result<Transaction, 
     let people: BTreeMap<&str, &PersonSpaces> = update
         .people
         .iter()
-        .map(|person| (person.name.as_str(), person))
+        .map(|person| (person.name.as_str(), person.as_ref()))
         .collect();
     for node in snapshot.nodes_of("person") {
         let node = node?;
         match people.get(node.name()?.as_str()) {
-            Some(person) => write_zones(&mut transaction, &node, person)?,
-            None => remove(&mut transaction, &node, &ZONES)?,
+            Some(person) => {
+                write_zones(&mut transaction, &node, person)?;
+                write_passages(&mut transaction, &node, person)?;
+            }
+            None => {
+                remove(&mut transaction, &node, &ZONES)?;
+                remove(&mut transaction, &node, &[PASSAGES])?;
+            }
         }
     }
     let objects: BTreeMap<&str, &ObjectUse> = update
@@ -281,6 +132,21 @@ fn write_zones(
         for (name, ring) in ZONES.iter().zip(rings) {
             transaction.set(node.id(), name, flat(ring));
         }
+    }
+    Ok(())
+}
+
+fn write_passages(
+    transaction: &mut Transaction,
+    node: &Node<'_>,
+    person: &PersonSpaces,
+) -> Result<(), dsr::ReadError> {
+    let Some(passages) = person.passages else {
+        return remove(transaction, node, &[PASSAGES]);
+    };
+    let text = Value::from(passages.map(Passage::name).join(", "));
+    if node.value(PASSAGES)?.as_ref() != Some(&text) {
+        transaction.set(node.id(), PASSAGES, text);
     }
     Ok(())
 }
@@ -356,7 +222,7 @@ fn is_near(old: &[Point2<f64>], new: &[Point2<f64>]) -> bool {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Turn {
     /// The grid, where it changed.
-    pub grid: Option<Arc<CostGrid>>,
+    pub grid: Option<GridUpdate>,
     /// What to write into the graph; often nothing.
     pub transaction: Transaction,
     /// What was left out or mended, where that differs from the turn before.
@@ -367,9 +233,14 @@ pub struct Turn {
 #[derive(Debug, Clone)]
 pub struct SocialMapping {
     mapper: SocialMapper,
+    /// The settings read last, and what was wrong with them.
+    settings: Option<String>,
+    refused: Vec<Rejection>,
+    groups: GroupNodes,
     period: f64,
     updated: Option<Time>,
-    unsent: bool,
+    /// Where the grid differs from the one given out last.
+    unsent: Region,
     rejected: Vec<Rejection>,
 }
 
@@ -382,9 +253,12 @@ impl SocialMapping {
         let mapper = SocialMapper::new(config)?;
         Ok(Self {
             mapper,
+            settings: None,
+            refused: Vec::new(),
+            groups: GroupNodes::new(),
             period,
             updated: None,
-            unsent: false,
+            unsent: Region::default(),
             rejected: Vec::new(),
         })
     }
@@ -397,12 +271,22 @@ impl SocialMapping {
         if !is_due(self.updated, now, self.period) {
             return Ok(Turn::default());
         }
-        let update = self.mapper.update(now, &scene(snapshot)?)?;
+        self.read_settings(snapshot).map_err(ReadError::from)?;
+        let mut scene = scene(snapshot, self.mapper.config())?;
+        scene.rejected.extend(self.refused.iter().cloned());
+        let update = self.mapper.update(now, &scene)?;
         // Reading may fail yet, and the next update would not call the change a change.
-        self.unsent |= update.changed;
-        let transaction = transaction(&update, snapshot).map_err(ReadError::from)?;
+        self.unsent = self.unsent.joined(&update.dirty);
+        let mut transaction = transaction(&update, snapshot).map_err(ReadError::from)?;
+        self.groups
+            .write(now, &update, snapshot, &mut transaction)
+            .map_err(ReadError::from)?;
         self.updated = Some(now);
-        let send = std::mem::take(&mut self.unsent);
+        let dirty = std::mem::take(&mut self.unsent);
+        let grid = (!dirty.is_empty()).then(|| GridUpdate {
+            dirty,
+            grid: Arc::clone(&update.grid),
+        });
         let rejected = if update.rejected == self.rejected {
             Vec::new()
         } else {
@@ -410,10 +294,44 @@ impl SocialMapping {
             update.rejected
         };
         Ok(Turn {
-            grid: send.then_some(update.grid),
+            grid,
             transaction,
             rejected,
         })
+    }
+}
+
+impl SocialMapping {
+    /// Takes over the world's settings where they changed. Those that cannot be used are reported and
+    /// leave all as it was.
+    fn read_settings(&mut self, snapshot: &Snapshot) -> Result<(), dsr::ReadError> {
+        let Some(world) = snapshot.nodes_of("world").next().transpose()? else {
+            return Ok(());
+        };
+        let value = world.value(SETTINGS)?;
+        let text = value.as_ref().and_then(Value::as_str);
+        if text == self.settings.as_deref() {
+            return Ok(());
+        }
+        self.refused.clear();
+        let read = serde_json::from_str::<SocialConfig>(text.unwrap_or("{}"));
+        let made = read
+            .map_err(|error| vec![error.to_string()])
+            .and_then(|config| {
+                let told =
+                    |problems: Vec<ConfigError>| problems.iter().map(ToString::to_string).collect();
+                SocialMapper::new(config).map_err(told)
+            });
+        match made {
+            Ok(mapper) => self.mapper = mapper,
+            Err(problems) => self.refused.extend(
+                problems
+                    .into_iter()
+                    .map(|problem| Rejection::Settings { problem }),
+            ),
+        }
+        self.settings = text.map(str::to_owned);
+        Ok(())
     }
 }
 

@@ -1,33 +1,40 @@
-//! From a scene to the grid, the polylines and what was rejected. This file owns the updating: it
-//! keeps the walls drawn, finds which stamps changed, and draws again only where they were and are.
+//! From a scene to the grid, the outlines, the groups and what was rejected. This file owns what is drawn
+//! for each thing of the scene, and makes anew only what belongs to things that changed.
 
+use super::adaptation::Passage;
 use super::config::{ConfigError, SocialConfig};
-use super::gaussian::AsymmetricGaussian;
-use super::layers::{Inflation, Stamp, Window};
-use super::scene::{Object, Person, Rejection, SceneError, SocialScene, Wall};
+use super::drawn::{Drawn, inflation};
+use super::found::{FoundGroup, found_groups};
+use super::four_sided::FourSided;
+use super::layers::Layer;
+use super::personal::{CooperationZone, passages_of, shape_of};
+use super::scene::{Object, Person, Rejection, SceneError, SocialScene};
+use super::stamps::Stamp;
 use super::visibility::visible;
 use super::zones::{Cuts, Zone};
-use crate::grid::CostGrid;
+use crate::grid::{CostGrid, Region};
 use dsr::Time;
 use nalgebra::{Isometry2, Point2};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Grid and graph carry R(t) to this many steps a unit, so that an approaching activity changes them
 /// every few seconds and not at every turn.
 const USAGE_STEPS: f64 = 100.0;
-/// With more changed windows than this, drawing everything is cheaper than comparing them.
-const MOST_WINDOWS: usize = 256;
 
 /// What one update brought.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Update {
     /// The cost of each place for the robot's centre.
     pub grid: Arc<CostGrid>,
-    /// Whether any cost differs from the update before.
-    pub changed: bool,
+    /// Outside of it, each cost is that of the update before: all of the grid at first, and where
+    /// walls, bounds or figures changed. Empty where no cost changed.
+    pub dirty: Region,
     /// The zones of each person, in the scene's order. Empty without social behaviour.
-    pub people: Vec<PersonSpaces>,
+    pub people: Vec<Arc<PersonSpaces>>,
+    /// Who stands together. Empty without social behaviour.
+    pub groups: Arc<[FoundGroup]>,
     /// The space and usage of each object that has one, in the scene's order. Empty without social
     /// behaviour.
     pub objects: Vec<ObjectUse>,
@@ -42,6 +49,15 @@ pub struct PersonSpaces {
     pub name: String,
     /// Where the polylines were drawn.
     pub world_from_person: Isometry2<f64>,
+    /// The widths of the density, standing, as the outlines show it.
+    pub shape: FourSided,
+    /// The widths on the grid, with what walking adds.
+    pub moving: FourSided,
+    /// Whether the robot passes between the person and the walls ahead, to the left, behind and to the
+    /// right, where the configuration has space give way to walls (FD IV-C).
+    pub passages: Option<[Passage; 4]>,
+    /// Where the person wants the robot.
+    pub open: Vec<CooperationZone>,
     /// Outline of the intimate zone.
     pub intimate: Vec<Point2<f64>>,
     /// Outline of the personal zone.
@@ -58,7 +74,7 @@ pub struct ObjectUse {
     /// Where the polyline was drawn.
     pub world_from_object: Isometry2<f64>,
     /// Outline of the space as far as walls let it reach, a closed polyline like a person's.
-    pub space: Vec<Point2<f64>>,
+    pub space: Arc<[Point2<f64>]>,
     /// R(t) now.
     pub usage: f64,
 }
@@ -75,20 +91,6 @@ impl ObjectUse {
 pub struct SocialMapper {
     config: SocialConfig,
     drawn: Option<Drawn>,
-}
-
-/// What stands on the grid.
-#[derive(Debug, Clone)]
-struct Drawn {
-    bounds: [f64; 4],
-    walls: Vec<Wall>,
-    robot_radius: f64,
-    /// The walls alone.
-    base: CostGrid,
-    stamps: Vec<Stamp>,
-    /// Clipping by walls is the dearest step, so spaces are kept while their object rests.
-    spaces: Vec<(Object, Vec<Point2<f64>>)>,
-    grid: Arc<CostGrid>,
 }
 
 impl SocialMapper {
@@ -135,29 +137,50 @@ impl SocialMapper {
         let fresh = self.drawn.take().filter(|drawn| drawn.fits(scene));
         let first = fresh.is_none();
         let mut drawn = fresh.unwrap_or_else(|| Drawn::new(&self.config, scene));
+        drawn.social = scene.social;
 
         let uses = if scene.social {
             self.object_uses(now, scene, &objects, &mut drawn)
         } else {
             Vec::new()
         };
+        let spaces = self.person_spaces(scene, &people, &mut drawn, &mut rejected);
+        let groups = drawn.groups.clone().unwrap_or_else(|crowd| {
+            rejected.push(crowd.into());
+            Arc::default()
+        });
         let mut stamps = self.object_stamps(scene, &objects, &uses);
-        stamps.extend(self.people_stamps(scene, &people, &mut rejected));
-        let changed = drawn.redraw(stamps) || first;
-
+        stamps.extend(self.people_stamps(scene, &people, &spaces, &mut rejected));
+        if self.config.group_space {
+            let cuts = Cuts::new(&self.config.proxemics.levels);
+            stamps.extend(groups.iter().map(|group| Stamp::Zones {
+                world_from_person: group.entity.world_from_group,
+                shape: group.widths,
+                cuts,
+                open: Vec::new(),
+                shut: [false; 4],
+            }));
+        }
+        let mut dirty = drawn.redraw(stamps);
+        if first {
+            dirty = drawn.grid.whole();
+        }
         let update = Update {
             grid: Arc::clone(&drawn.grid),
-            changed,
-            people: if scene.social {
-                self.person_spaces(&people)
-            } else {
-                Vec::new()
-            },
+            dirty,
+            people: spaces,
+            groups,
             objects: uses,
             rejected,
         };
         self.drawn = Some(drawn);
         Ok(update)
+    }
+
+    /// A layer of the map as it was last updated; `None` before the first update. Drawn for whoever
+    /// asks: the map itself needs no layers.
+    pub fn layer(&self, layer: Layer) -> Option<CostGrid> {
+        self.drawn.as_ref().map(|drawn| drawn.layer(layer))
     }
 
     /// The objects that have a space, each with its outline and usage.
@@ -175,14 +198,15 @@ impl SocialMapper {
                 continue;
             };
             let outline = match drawn.spaces.iter().find(|(known, _)| known == *object) {
-                Some((_, outline)) => outline.clone(),
+                Some((_, outline)) => Arc::clone(outline),
                 None => visible(
                     &space.polygon(&object.outline, &object.world_from_object),
                     space.viewpoint(&object.outline, &object.world_from_object),
                     &scene.walls,
-                ),
+                )
+                .into(),
             };
-            kept.push(((*object).clone(), outline.clone()));
+            kept.push(((*object).clone(), Arc::clone(&outline)));
             let curve = self
                 .config
                 .usage_of
@@ -212,7 +236,7 @@ impl SocialMapper {
             inflation,
         });
         let spaces = uses.iter().map(|one| Stamp::Space {
-            polygon: one.space.clone(),
+            polygon: Arc::clone(&one.space),
             cost: one.rounded_usage() as f32,
         });
         footprints.chain(spaces).collect()
@@ -222,23 +246,30 @@ impl SocialMapper {
     fn people_stamps(
         &self,
         scene: &SocialScene,
-        people: &[Person],
+        people: &[Cow<'_, Person>],
+        spaces: &[Arc<PersonSpaces>],
         rejected: &mut Vec<Rejection>,
     ) -> Vec<Stamp> {
-        let mut stamps = Vec::with_capacity(3 * people.len());
         let cuts = Cuts::new(&self.config.proxemics.levels);
-        for person in people {
+        let mut stamps = Vec::with_capacity(3 * people.len());
+        for (at, person) in people.iter().enumerate() {
             stamps.push(Stamp::Body {
                 centre: position(person),
-                radius: person.radius + scene.robot_radius,
+                radius: person.radius,
+                reach: scene.robot_radius,
             });
-            if scene.social {
-                stamps.push(Stamp::Zones {
-                    world_from_person: person.world_from_person,
-                    shape: self.shape(person),
+            // Without social behaviour nobody has spaces.
+            stamps.extend(spaces.get(at).map(|spaces| {
+                Stamp::Zones {
+                    world_from_person: spaces.world_from_person,
+                    shape: spaces.moving,
                     cuts,
-                });
-            }
+                    open: spaces.open.clone(),
+                    shut: spaces
+                        .passages
+                        .map_or([false; 4], |all| all.map(|one| !one.is_passable())),
+                }
+            }));
         }
         if scene.social {
             stamps.extend(self.between(scene, people, rejected));
@@ -246,14 +277,27 @@ impl SocialMapper {
         stamps
     }
 
-    /// The shape of a person's space on the grid.
-    fn shape(&self, person: &Person) -> AsymmetricGaussian {
-        let standing = self.config.proxemics.shape;
-        if self.config.stretch {
-            let own = person.world_from_person.rotation.inverse() * person.velocity;
-            standing.walking(own.x)
-        } else {
-            standing
+    /// Reports what the configuration does not know of a person.
+    fn check_manner(&self, person: &Person, rejected: &mut Vec<Rejection>) {
+        let mut unknown = |what: &'static str, given: &str, known: Vec<&str>| {
+            rejected.push(Rejection::PersonManner {
+                name: person.name.clone(),
+                what,
+                given: given.to_owned(),
+                known: known.join(", "),
+            });
+        };
+        let (activities, tasks) = (&self.config.activities, &self.config.cooperation);
+        if let Some(given) = &person.manner.activity
+            && !activities.contains_key(given)
+        {
+            let known = activities.keys().map(String::as_str).collect();
+            unknown("activity", given, known);
+        }
+        if let Some(given) = &person.manner.task
+            && !tasks.contains_key(given)
+        {
+            unknown("task", given, tasks.keys().map(String::as_str).collect());
         }
     }
 
@@ -261,7 +305,7 @@ impl SocialMapper {
     fn between(
         &self,
         scene: &SocialScene,
-        people: &[Person],
+        people: &[Cow<'_, Person>],
         rejected: &mut Vec<Rejection>,
     ) -> Vec<Stamp> {
         let places: BTreeMap<&str, Point2<f64>> = people
@@ -313,118 +357,64 @@ impl SocialMapper {
         stamps
     }
 
-    fn person_spaces(&self, people: &[Person]) -> Vec<PersonSpaces> {
-        let model = &self.config.proxemics;
-        people
-            .iter()
-            .map(|person| {
-                let pose = &person.world_from_person;
-                let contour = |zone| model.contour(zone, pose, self.config.contour_points);
-                PersonSpaces {
-                    name: person.name.clone(),
-                    world_from_person: *pose,
-                    intimate: contour(Zone::Intimate),
-                    personal: contour(Zone::Personal),
-                    social: contour(Zone::Social),
+    /// The zones of everybody, and the groups; those of before where nobody changed.
+    fn person_spaces(
+        &self,
+        scene: &SocialScene,
+        people: &[Cow<'_, Person>],
+        drawn: &mut Drawn,
+        rejected: &mut Vec<Rejection>,
+    ) -> Vec<Arc<PersonSpaces>> {
+        if !scene.social {
+            drawn.people.clear();
+            drawn.groups = Ok(Arc::default());
+            return Vec::new();
+        }
+        let mut same = drawn.people.len() == people.len();
+        for (at, person) in people.iter().enumerate() {
+            self.check_manner(person, rejected);
+            match drawn.people.get(at) {
+                Some((known, _)) if known == &**person => {}
+                Some(_) | None => {
+                    same = false;
+                    let made = Arc::new(self.spaces_of(person, scene));
+                    let entry = (person.clone().into_owned(), made);
+                    match drawn.people.get_mut(at) {
+                        Some(known) => *known = entry,
+                        None => drawn.people.push(entry),
+                    }
                 }
-            })
+            }
+        }
+        drawn.people.truncate(people.len());
+        if !same {
+            drawn.groups = found_groups(&self.config, people).map(Into::into);
+        }
+        drawn
+            .people
+            .iter()
+            .map(|(_, spaces)| Arc::clone(spaces))
             .collect()
     }
-}
 
-impl Drawn {
-    fn new(config: &SocialConfig, scene: &SocialScene) -> Self {
-        let mut base = CostGrid::covering(scene.bounds, config.resolution);
-        let inflation = inflation(config, scene.robot_radius);
-        for wall in &scene.walls {
-            Stamp::Wall {
-                wall: *wall,
-                inflation,
-            }
-            .draw(&mut base);
+    fn spaces_of(&self, person: &Person, scene: &SocialScene) -> PersonSpaces {
+        let levels = &self.config.proxemics.levels;
+        let pose = &person.world_from_person;
+        let shape = shape_of(&self.config, person, &scene.walls, false);
+        let contour = |level| shape.contour(pose, level, self.config.contour_points);
+        let task = person.manner.task.as_ref();
+        let open = task.and_then(|task| self.config.cooperation.get(task));
+        PersonSpaces {
+            name: person.name.clone(),
+            world_from_person: *pose,
+            shape,
+            moving: shape_of(&self.config, person, &scene.walls, true),
+            passages: passages_of(&self.config, person, &scene.walls),
+            open: open.cloned().unwrap_or_default(),
+            intimate: contour(levels.intimate),
+            personal: contour(levels.personal),
+            social: contour(levels.social),
         }
-        Self {
-            bounds: scene.bounds,
-            walls: scene.walls.clone(),
-            robot_radius: scene.robot_radius,
-            grid: Arc::new(base.clone()),
-            base,
-            stamps: Vec::new(),
-            spaces: Vec::new(),
-        }
-    }
-
-    /// Whether the walls of `scene` are the ones drawn.
-    #[expect(
-        clippy::float_cmp,
-        reason = "asks for the same scene, not for a similar one"
-    )]
-    fn fits(&self, scene: &SocialScene) -> bool {
-        self.bounds == scene.bounds
-            && self.walls == scene.walls
-            && self.robot_radius == scene.robot_radius
-    }
-
-    /// Replaces the stamps; true where a cost changed.
-    fn redraw(&mut self, stamps: Vec<Stamp>) -> bool {
-        let windows: Vec<Window> = stamps.iter().map(|s| s.window(&self.base)).collect();
-        let dirty = self.dirty(&stamps, &windows);
-        if dirty.is_empty() {
-            self.stamps = stamps;
-            return false;
-        }
-        let width = self.base.width;
-        let grid = Arc::make_mut(&mut self.grid);
-        let ranges = || dirty.iter().flat_map(|window| window.row_ranges(width));
-        let before: Vec<f32> = ranges().flat_map(|r| &grid.costs[r]).copied().collect();
-        for range in ranges() {
-            grid.costs[range.clone()].copy_from_slice(&self.base.costs[range]);
-        }
-        for (stamp, window) in stamps.iter().zip(&windows) {
-            if dirty.iter().any(|d| d.meets(window)) {
-                stamp.draw(grid);
-            }
-        }
-        self.stamps = stamps;
-        ranges().flat_map(|r| &grid.costs[r]).ne(&before)
-    }
-
-    /// The windows of stamps that are new or gone. Stamps are compared place by place: when one is
-    /// inserted, those after it count as changed once, which costs time and nothing else.
-    fn dirty(&self, stamps: &[Stamp], windows: &[Window]) -> Vec<Window> {
-        let mut dirty = Vec::new();
-        for i in 0..stamps.len().max(self.stamps.len()) {
-            let (old, new) = (self.stamps.get(i), stamps.get(i));
-            if old == new {
-                continue;
-            }
-            let was = old
-                .map(|stamp| stamp.window(&self.base))
-                .filter(|w| !w.is_empty());
-            let is = windows.get(i).copied().filter(|w| !w.is_empty());
-            match (was, is) {
-                (Some(was), Some(is)) if was.meets(&is) => dirty.push(was.joined(&is)),
-                (was, is) => dirty.extend(was.into_iter().chain(is)),
-            }
-        }
-        if dirty.len() > MOST_WINDOWS {
-            dirty = dirty
-                .into_iter()
-                .reduce(|all, one| all.joined(&one))
-                .into_iter()
-                .collect();
-        }
-        dirty
-    }
-}
-
-/// How obstacles grow for this robot. However slim it is, a wall blocks each cell it passes
-/// through, so no path slips through a wall.
-fn inflation(config: &SocialConfig, robot_radius: f64) -> Inflation {
-    Inflation {
-        reach: robot_radius.max(config.resolution * std::f64::consts::FRAC_1_SQRT_2),
-        extra: config.clearance_cost,
-        width: config.clearance_width,
     }
 }
 

@@ -5,30 +5,35 @@
 //! function of the scene and the time: what is updated step by step equals, bit for bit, what a
 //! new mapper would draw, because layers are combined by the maximum and by nothing else.
 //!
-//! The layers, in AP's order: walls and the footprints of objects, inflated by the robot's radius;
-//! the spaces of objects with R(t); people with their zones; the space between people who talk.
+//! The map has AP's layers in AP's order, see [`Layer`].
 
 pub mod adaptation;
 pub mod comfort;
 pub mod config;
 pub mod density;
+mod drawn;
 pub mod features;
+mod found;
 pub mod four_sided;
 pub mod gaussian;
 pub mod graph;
 pub mod groups;
-mod layers;
+pub mod layers;
 pub mod map;
 pub mod object_space;
+pub mod personal;
 pub mod scene;
+mod stamps;
 mod visibility;
 pub mod zones;
 
 pub use comfort::{Comfort, ComfortScene};
 pub use config::{ConfigError, SocialConfig};
+pub use found::FoundGroup;
 pub use four_sided::FourSided;
 pub use gaussian::AsymmetricGaussian;
 pub use graph::{SocialMapping, Turn};
+pub use layers::Layer;
 pub use map::{ObjectUse, PersonSpaces, SocialMapper, Update};
 pub use object_space::{Agenda, Outline, Space, UsageCurve};
 pub use scene::{Rejection, SceneError, SocialScene};

@@ -2,9 +2,13 @@
 //! map itself would be wrong the scene is refused; where one item is bad, the item alone is left
 //! out or mended as its [`Rejection`] says, and always reported.
 
+use super::features::FeatureError;
+use super::groups::TooManyPeople;
 use super::object_space::{Agenda, EndsBeforeStart, Outline};
 use dsr::Time;
 use nalgebra::{Isometry2, Point2, Vector2};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
 
 /// A wall from one point to another, world frame, metres.
 pub type Wall = [Point2<f64>; 2];
@@ -46,6 +50,21 @@ pub struct Person {
     pub velocity: Vector2<f64>,
     /// Radius of the body.
     pub radius: f64,
+    /// What else is known.
+    pub manner: Manner,
+}
+
+/// What a person does, feels and wants, as far as it is known.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Manner {
+    /// An activity by its name in the configuration, such as `cooking`.
+    pub activity: Option<String>,
+    /// The room that the person is in, which may tell the activity.
+    pub room: Option<String>,
+    /// Values of socialization features, by name.
+    pub features: BTreeMap<String, f64>,
+    /// What the robot does with the person, such as `escort`: opens the task's cooperation zones.
+    pub task: Option<String>,
 }
 
 /// An object.
@@ -137,6 +156,35 @@ pub enum Rejection {
         /// The object.
         name: String,
     },
+    /// The person counts as doing nothing in particular, or as working with the robot at nothing.
+    #[error("person {name}: there is no {what} `{given}`; there are {known}")]
+    PersonManner {
+        /// The person.
+        name: String,
+        /// `activity` or `task`.
+        what: &'static str,
+        /// As given.
+        given: String,
+        /// The names in the configuration.
+        known: String,
+    },
+    /// The person's features are left out.
+    #[error("person {name} has no features: {error}")]
+    PersonFeatures {
+        /// The person.
+        name: String,
+        /// What is wrong.
+        error: FeatureError,
+    },
+    /// The settings stay as they were.
+    #[error("the social settings of the world are not used: {problem}")]
+    Settings {
+        /// What is wrong.
+        problem: String,
+    },
+    /// Nobody is in a group.
+    #[error(transparent)]
+    Groups(#[from] TooManyPeople),
     /// The space between the two is left out.
     #[error("{name} and {other} interact, but nobody called {missing} has a place")]
     Interaction {
@@ -206,7 +254,7 @@ impl SocialScene {
     }
 
     /// The people who can be mapped.
-    pub(super) fn sound_people(&self, rejected: &mut Vec<Rejection>) -> Vec<Person> {
+    pub(super) fn sound_people(&self, rejected: &mut Vec<Rejection>) -> Vec<Cow<'_, Person>> {
         let mut people = Vec::with_capacity(self.people.len());
         for person in &self.people {
             let name = || person.name.clone();
@@ -214,19 +262,19 @@ impl SocialScene {
                 rejected.push(Rejection::PersonPose { name: name() });
                 continue;
             }
-            let mut person = person.clone();
+            let mut sound = Cow::Borrowed(person);
             if !person.velocity.iter().all(|v| v.is_finite()) {
                 rejected.push(Rejection::PersonVelocity { name: name() });
-                person.velocity = Vector2::zeros();
+                sound.to_mut().velocity = Vector2::zeros();
             }
             if !(person.radius.is_finite() && person.radius > 0.0) {
                 rejected.push(Rejection::PersonRadius {
                     name: name(),
                     radius: person.radius,
                 });
-                person.radius = BODY_RADIUS;
+                sound.to_mut().radius = BODY_RADIUS;
             }
-            people.push(person);
+            people.push(sound);
         }
         people
     }

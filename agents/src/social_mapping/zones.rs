@@ -142,8 +142,8 @@ pub fn zone_at(point: Point2<f64>, people: &[Isometry2<f64>]) -> Zone {
 /// The levels as squared deviations: one comparison a cell, no exponential.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Cuts {
-    intimate: f64,
-    personal: f64,
+    pub(super) intimate: f64,
+    pub(super) personal: f64,
     pub(super) social: f64,
 }
 

@@ -103,7 +103,7 @@ pub fn object_spaces(
         let agenda = scenario
             .activities
             .iter()
-            .filter(|activity| activity.object == object.name)
+            .filter(|activity| activity.object == object.name && !activity.cancelled)
             .filter_map(|activity| Agenda::new(activity.start, activity.end).ok())
             .collect();
         ObjectSpace::new(&object.name, &object.space, *curve, agenda)

@@ -3,16 +3,16 @@
 //! function of the situation, to the byte.
 
 mod key;
+mod passing;
 
 use super::canvas::{self, INK, PEOPLE, View, heat, number, rectangle, text};
 use super::label::{Labels, Look};
 use super::legend;
-use crate::situation::{Mapped, Situation};
+use crate::situation::Situation;
 use agents::grid::CostGrid;
-use agents::social_mapping::groups::GroupEntity;
 use agents::social_mapping::object_space::Outline;
-use agents::social_mapping::{FourSided, SocialConfig, Zone};
-use nalgebra::{Isometry2, Point2, Vector2};
+use agents::social_mapping::{Layer, SocialConfig, Update, Zone};
+use nalgebra::{Point2, Vector2};
 use svg::Document;
 use svg::node::element::{Group, Rectangle};
 
@@ -36,17 +36,17 @@ const NAMED: usize = 40;
 pub enum Show {
     /// How much places belong to people.
     Density,
-    /// What places cost the robot.
-    Costs,
+    /// What places cost the robot, as far as a layer knows.
+    Costs(Layer),
 }
 
-/// Draws a situation as SVG 1.1; see [`super::png`] for pixels.
-pub fn social(situation: &Situation, mapped: &Mapped, config: &SocialConfig, show: Show) -> String {
+/// Draws a situation as SVG 1.1, with the grid that the update carries; see [`super::png`] for pixels.
+pub fn social(situation: &Situation, update: &Update, config: &SocialConfig, show: Show) -> String {
     let view = View::new(situation.scene.bounds, 0.0, [BORDER, TITLE + BORDER], MAP);
     let [map_width, map_height] = view.size();
     let left = BORDER + map_width + BORDER;
     let (column, column_height) =
-        key::column([left, TITLE + BORDER], situation, mapped, config, show);
+        key::column([left, TITLE + BORDER], situation, update, config, show);
     let width = number(left + WIDTH + BORDER);
     let below = column_height.max(map_height + canvas::SCALE_BAR);
     let height = number(TITLE + BORDER + below + BORDER);
@@ -61,8 +61,9 @@ pub fn social(situation: &Situation, mapped: &Mapped, config: &SocialConfig, sho
         .set("font-weight", "bold")
         .set("fill", INK);
     let what = match show {
-        Show::Density => "people's density",
-        Show::Costs => "what a place costs the robot",
+        Show::Density => "people's density".to_owned(),
+        Show::Costs(Layer::Master) => "what a place costs the robot".to_owned(),
+        Show::Costs(layer) => format!("what a place costs the robot, layer {}", layer.name()),
     };
     let line = format!("{what}, {}", situation.moment);
     let subtitle = text(BORDER, BORDER + 36.0, &line, 13.0).set("fill", INK);
@@ -79,7 +80,7 @@ pub fn social(situation: &Situation, mapped: &Mapped, config: &SocialConfig, sho
         .add(page)
         .add(heading)
         .add(subtitle)
-        .add(map(&view, situation, mapped, config, show))
+        .add(map(&view, situation, update, config, show))
         .add(view.frame().set("fill", "none").set("stroke", "#999999"))
         .add(view.scale_bar())
         .add(column);
@@ -89,7 +90,7 @@ pub fn social(situation: &Situation, mapped: &Mapped, config: &SocialConfig, sho
 fn map(
     view: &View,
     situation: &Situation,
-    mapped: &Mapped,
+    update: &Update,
     config: &SocialConfig,
     show: Show,
 ) -> Group {
@@ -106,18 +107,19 @@ fn map(
         group = group.add(view.polygon(room.iter().copied()).set("fill", "#ffffff"));
     }
     group = match show {
-        Show::Costs => group.add(costs(view, &mapped.update.grid)),
+        Show::Costs(_) => group.add(costs(view, &update.grid)),
         Show::Density => group
-            .add(spaces(view, mapped, config))
-            .add(bands(view, mapped, config)),
+            .add(spaces(view, update, config))
+            .add(bands(view, update)),
     };
     group = group
-        .add(contours(view, mapped, config))
-        .add(groups(view, mapped, config))
+        .add(contours(view, update, config))
+        .add(passing::passing(view, update, &config.proxemics.levels))
+        .add(groups(view, update, config))
         .add(walls(view, situation))
-        .add(people(view, mapped, situation, &mut labels));
-    label_groups(view, mapped, &mut labels);
-    for one in &mapped.update.objects {
+        .add(people(view, update, situation, &mut labels));
+    label_groups(view, update, &mut labels);
+    for one in &update.objects {
         let look = Look {
             size: 11.0,
             colour: INK,
@@ -167,8 +169,8 @@ fn cost_colour(cost: f32) -> Option<String> {
     }
 }
 
-fn spaces(view: &View, mapped: &Mapped, config: &SocialConfig) -> Group {
-    let objects = &mapped.update.objects;
+fn spaces(view: &View, update: &Update, config: &SocialConfig) -> Group {
+    let objects = &update.objects;
     objects.iter().fold(Group::new(), |group, one| {
         let curve = config.usage_of.get(&one.name).unwrap_or(&config.usage);
         let share = if curve.most > curve.least {
@@ -189,15 +191,16 @@ fn spaces(view: &View, mapped: &Mapped, config: &SocialConfig) -> Group {
 
 /// Bands of density: everybody's outlines of one level lie under everybody's of the next, so that
 /// what shows is the greatest density of all.
-fn bands(view: &View, mapped: &Mapped, config: &SocialConfig) -> Group {
-    let shape = config.proxemics.shape;
+fn bands(view: &View, update: &Update) -> Group {
     (1..=BANDS).fold(Group::new(), |group, band| {
         let level = f64::from(band) / f64::from(BANDS + 1);
         let layer = Group::new()
             .set("fill", density_colour(level))
             .set("fill-opacity", if band == 1 { "0.75" } else { "0.85" });
-        group.add(mapped.update.people.iter().fold(layer, |layer, person| {
-            let outline = shape.contour(&person.world_from_person, level, OUTLINE);
+        group.add(update.people.iter().fold(layer, |layer, person| {
+            let outline = person
+                .shape
+                .contour(&person.world_from_person, level, OUTLINE);
             layer.add(view.polygon(outline))
         }))
     })
@@ -216,7 +219,7 @@ fn density_colour(level: f64) -> String {
 }
 
 /// The zones' edges, the closest drawn strongest.
-fn contours(view: &View, mapped: &Mapped, config: &SocialConfig) -> Group {
+fn contours(view: &View, update: &Update, config: &SocialConfig) -> Group {
     let edges = [
         (Zone::Social, "0.8", "4 3"),
         (Zone::Personal, "1.1", "none"),
@@ -230,43 +233,37 @@ fn contours(view: &View, mapped: &Mapped, config: &SocialConfig) -> Group {
                 .set("stroke", "#0b2f5b")
                 .set("stroke-width", width)
                 .set("stroke-dasharray", dashes);
-            group.add(mapped.update.people.iter().fold(layer, |layer, person| {
-                let outline = config
-                    .proxemics
-                    .contour(zone, &person.world_from_person, OUTLINE);
-                layer.add(view.polygon(outline))
+            let Some(level) = config.proxemics.levels.level(zone) else {
+                return group;
+            };
+            group.add(update.people.iter().fold(layer, |layer, person| {
+                let pose = &person.world_from_person;
+                layer.add(view.polygon(person.shape.contour(pose, level, OUTLINE)))
             }))
         })
 }
 
 /// Groups: their members joined to their middle, which way they face, and the space of the whole.
-fn groups(view: &View, mapped: &Mapped, config: &SocialConfig) -> Group {
-    let person = FourSided::from(config.proxemics.shape);
+fn groups(view: &View, update: &Update, config: &SocialConfig) -> Group {
     let level = config.proxemics.levels.personal;
+    let place = |name: &String| {
+        let member = update.people.iter().find(|person| person.name == *name)?;
+        Some(Point2::from(member.world_from_person.translation.vector))
+    };
     let mut all = Group::new().set("stroke", GROUP).set("fill", "none");
-    for members in &mapped.groups {
-        let poses: Vec<Isometry2<f64>> = members
-            .iter()
-            .map(|member| mapped.update.people[*member].world_from_person)
-            .collect();
-        let Some(entity) = GroupEntity::new(&poses) else {
-            continue;
-        };
-        let centre = Point2::from(entity.world_from_group.translation.vector);
-        let mut group = Group::new();
-        let outline = entity
-            .widths(&person)
-            .contour(&entity.world_from_group, level, OUTLINE);
-        group = group.add(
+    for found in update.groups.iter() {
+        let pose = &found.entity.world_from_group;
+        let centre = Point2::from(pose.translation.vector);
+        let outline = found.widths.contour(pose, level, OUTLINE);
+        let mut group = Group::new().add(
             view.polygon(outline)
                 .set("stroke-width", "1.4")
                 .set("stroke-dasharray", "7 4"),
         );
-        for pose in &poses {
-            let spoke = view.line(centre, pose.translation.vector.into());
-            group = group.add(spoke.set("stroke-width", "2.2"));
+        for member in found.members.iter().filter_map(place) {
+            group = group.add(view.line(centre, member).set("stroke-width", "2.2"));
         }
-        let ahead = entity.world_from_group * Point2::new(0.45, 0.0);
+        let ahead = pose * Point2::new(0.45, 0.0);
         group = group
             .add(arrow(view, centre, ahead).set("fill", GROUP))
             .add(
@@ -280,16 +277,9 @@ fn groups(view: &View, mapped: &Mapped, config: &SocialConfig) -> Group {
 }
 
 /// The groups' numbers, after the names of people.
-fn label_groups(view: &View, mapped: &Mapped, labels: &mut Labels) {
-    for (index, members) in mapped.groups.iter().enumerate() {
-        let poses: Vec<Isometry2<f64>> = members
-            .iter()
-            .map(|member| mapped.update.people[*member].world_from_person)
-            .collect();
-        let Some(entity) = GroupEntity::new(&poses) else {
-            continue;
-        };
-        let centre = view.page(entity.world_from_group.translation.vector.into());
+fn label_groups(view: &View, update: &Update, labels: &mut Labels) {
+    for (index, found) in update.groups.iter().enumerate() {
+        let centre = view.page(found.entity.world_from_group.translation.vector.into());
         let look = Look {
             size: 12.0,
             colour: GROUP,
@@ -336,8 +326,8 @@ fn walls(view: &View, situation: &Situation) -> Group {
 }
 
 /// Bodies with an arrow where they face.
-fn people(view: &View, mapped: &Mapped, situation: &Situation, labels: &mut Labels) -> Group {
-    let spaces = &mapped.update.people;
+fn people(view: &View, update: &Update, situation: &Situation, labels: &mut Labels) -> Group {
+    let spaces = &update.people;
     let mut group = Group::new();
     for person in spaces {
         let radius = situation

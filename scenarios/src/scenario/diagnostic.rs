@@ -127,6 +127,12 @@ pub enum ProblemKind {
         /// What is allowed.
         allowed: &'static str,
     },
+    /// A figure of social mapping that cannot be.
+    #[error("{message}")]
+    Figure {
+        /// What it has to be.
+        message: String,
+    },
     /// A name that names nothing.
     #[error("there is no {kind} called `{name}`")]
     UnknownName {

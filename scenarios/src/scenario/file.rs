@@ -1,21 +1,30 @@
 //! The main file, `scenario.toml`, as a whole: the order in which its tables are read, and the
 //! names that they share. Names are unique over all tables, because they become node names.
 
-use super::diagnostic::{Problem, ProblemKind, suggest};
+use super::diagnostic::{Invalid, Problem, ProblemKind, suggest};
 use super::reader::{Bound, Located, Problems, Table};
 use super::value::Preemption;
-use super::{Activity, Mission, Scenario, TracksFrame};
-use super::{devices, people, space};
+use super::{Mission, Scenario, TracksFrame};
+use super::{devices, people, schedule, space};
+use agents::social_mapping::SocialConfig;
 use dsr::Time;
+use jiff::Timestamp;
 use jiff::civil::{Date, DateTime, Time as ClockTime};
 use jiff::tz::TimeZone;
 use nalgebra::{Isometry2, Point2, Vector2};
 use std::ops::Range;
 use std::path::PathBuf;
+use toml::Spanned;
 use toml::de::DeTable;
 
 /// Gives the text of a file beside the main one.
 pub(super) type Read<'a> = &'a dyn Fn(&str) -> std::io::Result<String>;
+
+/// A file beside the main one.
+pub(super) struct Beside {
+    pub(super) path: String,
+    pub(super) text: String,
+}
 
 /// What a name names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,9 +40,33 @@ pub(super) enum Kind {
 pub(super) struct Names<'a> {
     text: &'a str,
     taken: Vec<(String, Kind, Range<usize>)>,
+    /// Those of the file that this one belongs to.
+    elsewhere: Vec<(String, Kind)>,
+    any_object: bool,
 }
 
-impl Names<'_> {
+impl<'a> Names<'a> {
+    /// No names yet of the file with this text.
+    pub(super) fn new(text: &'a str) -> Self {
+        Self {
+            text,
+            taken: Vec::new(),
+            elsewhere: Vec::new(),
+            any_object: false,
+        }
+    }
+
+    /// Takes the names of the file that this one belongs to.
+    pub(super) fn take_elsewhere<'n>(&mut self, names: impl Iterator<Item = (&'n String, Kind)>) {
+        self.elsewhere
+            .extend(names.map(|(name, kind)| (name.clone(), kind)));
+    }
+
+    /// From now on every name may be an object's.
+    pub(super) fn accept_objects(&mut self) {
+        self.any_object = true;
+    }
+
     /// The name of the table, noted as taken. A bad one is noted and taken all the same, so that what
     /// refers to it is not also reported.
     pub(super) fn take(&mut self, table: &Table<'_>, kind: Kind) -> Option<String> {
@@ -58,6 +91,12 @@ impl Names<'_> {
             };
             table.problems.add(kind, name.span.clone());
         }
+        if self.elsewhere.iter().any(|(taken, _)| *taken == value) {
+            let message = "the scenario's main file has something of this name already";
+            table
+                .problems
+                .add(ProblemKind::BadEntry { message }, name.span.clone());
+        }
         self.taken.push((value.clone(), kind, name.span));
         Some(value)
     }
@@ -75,9 +114,12 @@ impl Names<'_> {
 
     /// Whether something of this kind has this name.
     pub(super) fn is(&self, name: &str, kind: Kind) -> bool {
-        self.taken
-            .iter()
-            .any(|(taken, of, _)| taken == name && *of == kind)
+        let here = self.taken.iter().map(|(taken, of, _)| (taken, of));
+        let elsewhere = self.elsewhere.iter().map(|(taken, of)| (taken, of));
+        self.any_object && kind == Kind::Object
+            || here
+                .chain(elsewhere)
+                .any(|(taken, of)| taken == name && *of == kind)
     }
 
     /// Notes that there is no `what` called so.
@@ -88,11 +130,12 @@ impl Names<'_> {
         kinds: &[Kind],
         name: &Located<String>,
     ) {
-        let known = self
-            .taken
-            .iter()
-            .filter(|(_, kind, _)| kinds.contains(kind));
-        let help = suggest(&name.value, known.map(|(name, ..)| name.as_str()));
+        let here = self.taken.iter().map(|(name, kind, _)| (name, kind));
+        let elsewhere = self.elsewhere.iter().map(|(name, kind)| (name, kind));
+        let known = here
+            .chain(elsewhere)
+            .filter(|(_, kind)| kinds.contains(kind));
+        let help = suggest(&name.value, known.map(|(name, _)| name.as_str()));
         let kind = ProblemKind::UnknownName {
             kind: what,
             name: name.value.clone(),
@@ -127,27 +170,48 @@ pub(super) fn point(table: &Table<'_>, key: &'static str) -> Point2<f64> {
     Point2::new(x, y)
 }
 
-/// Reads the main file.
-pub(super) fn scenario(text: &str, read: Read<'_>) -> Result<Scenario, Vec<Problem>> {
+/// The day that a time is of, as if it were UTC.
+pub(super) fn date(time: Time) -> Date {
+    let moment = Timestamp::from_nanosecond(time.nanoseconds().into()).unwrap_or_default();
+    moment.to_zoned(TimeZone::UTC).date()
+}
+
+/// The text as TOML; all that is wrong with its syntax otherwise.
+pub(super) fn document(text: &str) -> Result<Spanned<DeTable<'_>>, Vec<Problem>> {
     let (document, errors) = DeTable::parse_recoverable(text);
-    if !errors.is_empty() {
-        let syntax = |error: &toml::de::Error| {
-            let message = error.message().to_owned();
-            Problem::new(
-                ProblemKind::Syntax { message },
-                error.span().unwrap_or(0..0),
-            )
-        };
-        return Err(errors.iter().map(syntax).collect());
+    if errors.is_empty() {
+        return Ok(document);
     }
+    let syntax = |error: &toml::de::Error| {
+        let message = error.message().to_owned();
+        Problem::new(
+            ProblemKind::Syntax { message },
+            error.span().unwrap_or(0..0),
+        )
+    };
+    Err(errors.iter().map(syntax).collect())
+}
+
+/// Reads the main file. The schedule's own file, where there is one, is for [`schedule::extend`].
+pub(super) fn scenario(
+    text: &str,
+    read: Read<'_>,
+) -> Result<(Scenario, Option<Beside>), Vec<Problem>> {
+    let document = document(text)?;
     let problems = Problems::default();
     let title = "the scenario".to_owned();
     let table = Table::new(document.get_ref(), 0..0, title, &problems);
     let scenario = whole(&table, text, read);
+    let schedule = table.has("schedule").then(|| Beside {
+        text: file(&table, "schedule", "", read),
+        path: table
+            .get::<String>("schedule")
+            .map_or_else(String::new, |path| path.value),
+    });
     table.close();
     let problems = problems.into_vec();
     if problems.is_empty() {
-        Ok(scenario)
+        Ok((scenario, schedule))
     } else {
         Err(problems)
     }
@@ -156,10 +220,7 @@ pub(super) fn scenario(text: &str, read: Read<'_>) -> Result<Scenario, Vec<Probl
 /// Reads every table. Where a value is wrong a stand-in takes its place, so that the rest is still
 /// checked; the result then never leaves [`scenario`].
 fn whole(table: &Table<'_>, text: &str, read: Read<'_>) -> Scenario {
-    let mut names = Names {
-        text,
-        taken: Vec::new(),
-    };
+    let mut names = Names::new(text);
     if !table.has("start") {
         table.missing("start");
     }
@@ -197,10 +258,11 @@ fn whole(table: &Table<'_>, text: &str, read: Read<'_>) -> Scenario {
     };
     let people = people::people(table, &mut names, &scene);
     let streams = people::streams(table, &mut names, &rooms);
-    let activities = activities(table, &mut names, begin.date());
+    let activities = schedule::activities(table, &mut names, begin.date());
     let missions = missions(table, &mut names, read);
     let rules = file(table, "rules", "rules.aggl", read);
     let tracks = tracks(table);
+    let social = social(table);
     Scenario {
         name,
         folder: PathBuf::new(),
@@ -220,6 +282,7 @@ fn whole(table: &Table<'_>, text: &str, read: Read<'_>) -> Scenario {
         missions,
         rules,
         tracks,
+        social,
     }
 }
 
@@ -236,47 +299,6 @@ fn file(table: &Table<'_>, key: &'static str, default: &str, read: Read<'_>) -> 
         table.problems.add(kind, table.span_of(key));
         String::new()
     })
-}
-
-fn activities(scenario: &Table<'_>, names: &mut Names<'_>, day: Date) -> Vec<Activity> {
-    let mut activities = Vec::new();
-    for table in scenario.tables("activity") {
-        let name = names.take(&table, Kind::Other);
-        let object = table.require::<String>("object");
-        if let Some(object) = object
-            .as_ref()
-            .filter(|o| !names.is(&o.value, Kind::Object))
-        {
-            names.unknown(table.problems, "object", &[Kind::Object], object);
-        }
-        for key in ["start", "end"] {
-            if !table.has(key) {
-                table.missing(key);
-            }
-        }
-        let clocks = (
-            table.moment::<ClockTime>("start"),
-            table.moment::<ClockTime>("end"),
-        );
-        if let (Some(start), Some(end)) = clocks {
-            if end <= start {
-                table
-                    .problems
-                    .add(ProblemKind::EndsBeforeStart, table.span_of("end"));
-            }
-            let times = time_of_day(day, start).zip(time_of_day(day, end));
-            if let (Some(name), Some(object), Some((start, end))) = (name, object, times) {
-                activities.push(Activity {
-                    name,
-                    object: object.value,
-                    start,
-                    end,
-                });
-            }
-        }
-        table.close();
-    }
-    activities
 }
 
 fn missions(scenario: &Table<'_>, names: &mut Names<'_>, read: Read<'_>) -> Vec<Mission> {
@@ -319,4 +341,37 @@ fn tracks(scenario: &Table<'_>) -> TracksFrame {
     };
     table.close();
     tracks
+}
+
+/// The figures of social mapping by themselves: a file with the table `[social]` alone.
+///
+/// # Errors
+/// Every problem found, each with its line and column.
+pub fn parse_social(file: &str, text: &str) -> Result<SocialConfig, Box<Invalid>> {
+    let read = || {
+        let document = document(text)?;
+        let problems = Problems::default();
+        let title = "the settings".to_owned();
+        let table = Table::new(document.get_ref(), 0..0, title, &problems);
+        let config = social(&table);
+        table.close();
+        let problems = problems.into_vec();
+        if problems.is_empty() {
+            Ok(config)
+        } else {
+            Err(problems)
+        }
+    };
+    read().map_err(|problems| Box::new(Invalid::new(file, text, problems)))
+}
+
+/// The figures of social mapping; those not given have their defaults.
+fn social(scenario: &Table<'_>) -> SocialConfig {
+    let config: SocialConfig = scenario.deserialize("social").unwrap_or_default();
+    for problem in config.problems() {
+        let message = format!("{} {}", problem.field, problem.requirement);
+        let kind = ProblemKind::Figure { message };
+        scenario.problems.add(kind, scenario.span_of("social"));
+    }
+    config
 }

@@ -1,7 +1,8 @@
 //! From a folder to a [`Scenario`]. The only file of the loader that touches the disk.
 
 use super::diagnostic::{Invalid, LoadError};
-use super::{Scenario, file};
+use super::file::{self, Beside};
+use super::{Scenario, schedule};
 use std::path::Path;
 
 /// The file that makes a folder a scenario.
@@ -35,6 +36,12 @@ impl Scenario {
         text: &str,
         read: &dyn Fn(&str) -> std::io::Result<String>,
     ) -> Result<Self, Box<Invalid>> {
-        file::scenario(text, read).map_err(|problems| Box::new(Invalid::new(file, text, problems)))
+        let (mut scenario, schedule) = file::scenario(text, read)
+            .map_err(|problems| Box::new(Invalid::new(file, text, problems)))?;
+        if let Some(Beside { path, text }) = schedule {
+            let path = Path::new(file).with_file_name(path).display().to_string();
+            schedule::extend(&mut scenario, &path, &text)?;
+        }
+        Ok(scenario)
     }
 }

@@ -6,7 +6,7 @@ use super::value::{Value, is_finite};
 use std::cell::RefCell;
 use std::ops::Range;
 use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml::de::{DeTable, DeValue, ValueDeserializer};
 
 /// Every problem found so far.
 #[derive(Debug, Default)]
@@ -237,6 +237,21 @@ impl<'a> Table<'a> {
         };
         self.problems.add(kind, found.span());
         None
+    }
+
+    /// The value of `key` as serde reads it; the first problem is noted with its place.
+    pub(super) fn deserialize<T: serde::de::DeserializeOwned>(
+        &self,
+        key: &'static str,
+    ) -> Option<T> {
+        let found = self.find(key)?;
+        T::deserialize(ValueDeserializer::from(found.clone()))
+            .map_err(|error| {
+                let message = error.message().to_owned();
+                let span = error.span().unwrap_or_else(|| found.span());
+                self.problems.add(ProblemKind::Figure { message }, span);
+            })
+            .ok()
     }
 
     /// Notes every key that nobody asked for.

@@ -8,6 +8,9 @@ use expect_test::{Expect, expect};
 use miette::{GraphicalReportHandler, GraphicalTheme};
 use nalgebra::Point2;
 
+mod schedule;
+mod social;
+
 const TWO_ROOMS: &str = r#"
 name = "two-rooms"
 start = "2026-03-02T10:00:00"
@@ -219,7 +222,7 @@ end = "10:00"
              6 │ 
                ╰────
               help: known are: start, name, duration, room, door, wall, bounds, place, object,
-                    camera, robot, person, stream, activity, mission, rules, tracks
+                    camera, robot, person, stream, activity, mission, rules, tracks, social
 
             Error: 
               × room `hall` has 2 corners, a polygon needs at least 3

@@ -72,9 +72,9 @@ fn find(
     let frames = recording.frames.iter();
     frames
         .map(|frame| {
-            let poses: Vec<Isometry2<f64>> = frame.people.iter().map(|(_, pose)| *pose).collect();
+            let poses: Vec<Isometry2<f64>> = frame.people.iter().map(|one| one.pose).collect();
             let groups = grouping.groups(&poses)?;
-            let named = |group: Vec<usize>| group.iter().map(|i| frame.people[*i].0).collect();
+            let named = |group: Vec<usize>| group.iter().map(|i| frame.people[*i].id).collect();
             Ok(groups.into_iter().map(named).collect())
         })
         .collect()

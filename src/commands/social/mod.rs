@@ -3,6 +3,7 @@
 mod comfort;
 mod groups;
 mod picture;
+mod schedule;
 
 use crate::cli::{Social as Arguments, SocialAction};
 use crate::{Answer, Failure};
@@ -13,8 +14,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     match &arguments.action {
         SocialAction::Groups { file, method, json } => groups::run(file, *method, *json),
         SocialAction::Comfort { file, json } => comfort::run(file, *json),
+        SocialAction::Schedule { file, instance } => schedule::run(file, instance),
         SocialAction::Density(arguments) => picture::run(arguments, Show::Density),
-        SocialAction::Map(arguments) => picture::run(arguments, Show::Costs),
+        SocialAction::Map { picture, layer } => picture::run(picture, Show::Costs(*layer)),
     }
 }
 

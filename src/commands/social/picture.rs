@@ -7,14 +7,15 @@ use crate::commands::output::print;
 use crate::{Answer, Failure};
 use agents::grid::CostGrid;
 use agents::social_mapping::SocialConfig;
-use agents::social_mapping::groups::Grouping;
 use dsr::Time;
 use scenarios::Scenario;
 use scenarios::picture::{Show, png, social};
+use scenarios::scenario::parse_social;
 use scenarios::scenes::parse_recording;
 use scenarios::situation::Situation;
 use std::fmt::Write as _;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Pixels of a PNG for each of the SVG's.
 const SCALE: f32 = 1.5;
@@ -25,7 +26,7 @@ pub(super) fn run(arguments: &Arguments, show: Show) -> Result<Answer, Failure> 
     let kind = out.extension().and_then(|kind| kind.to_str()).unwrap_or("");
     let known = match show {
         Show::Density => &["png", "svg"][..],
-        Show::Costs => &["png", "svg", "yaml"],
+        Show::Costs(_) => &["png", "svg", "yaml"],
     };
     if !known.contains(&kind) {
         return Err(Failure::input_with_help(
@@ -33,30 +34,35 @@ pub(super) fn run(arguments: &Arguments, show: Show) -> Result<Answer, Failure> 
             format!("its ending decides what is written: .{}", known.join(", .")),
         ));
     }
-    let situation = situation(arguments)?;
-    let config = SocialConfig::default();
-    let mapped = situation
-        .map(&config, &Grouping::of(arguments.method))
+    let (situation, mut config) = situation(arguments)?;
+    if let Some(method) = arguments.method {
+        config.grouping.method = method;
+    }
+    let (mut update, mapper) = situation
+        .map(&config)
         .map_err(|error| refused(&arguments.file, error))?;
-    let svg = || social(&situation, &mapped, &config, show);
+    if let Show::Costs(layer) = show {
+        update.grid = mapper.layer(layer).map_or(update.grid, Arc::new);
+    }
+    let svg = || social(&situation, &update, &config, show);
     match kind {
         "svg" => write(out, svg().as_bytes())?,
         "png" => write(out, &png(&svg(), SCALE).map_err(Failure::internal)?)?,
         _ => {
             let image = out.with_extension("pgm");
-            write(&image, &pgm(&mapped.update.grid))?;
-            write(out, yaml(&mapped.update.grid, &image).as_bytes())?;
+            write(&image, &pgm(&update.grid))?;
+            write(out, yaml(&update.grid, &image).as_bytes())?;
         }
     }
     let mut text = format!(
         "{}, {}: people {}, groups {} -> {}\n",
         situation.name,
         situation.moment,
-        mapped.update.people.len(),
-        mapped.groups.len(),
+        update.people.len(),
+        update.groups.len(),
         out.display()
     );
-    for rejection in &mapped.update.rejected {
+    for rejection in &update.rejected {
         // Writing to a string does not fail.
         let _ = writeln!(text, "{rejection}");
     }
@@ -64,14 +70,16 @@ pub(super) fn run(arguments: &Arguments, show: Show) -> Result<Answer, Failure> 
     Ok(Answer::Yes)
 }
 
-/// A recording's frame, or a scenario at a time.
-fn situation(arguments: &Arguments) -> Result<Situation, Failure> {
+/// A recording's frame, or a scenario at a time, with the figures of social mapping.
+fn situation(arguments: &Arguments) -> Result<(Situation, SocialConfig), Failure> {
     let file = &arguments.file;
-    let name = || {
-        let stem = file
-            .file_stem()
-            .map(|stem| stem.to_string_lossy().into_owned());
-        stem.unwrap_or_default()
+    let settings = match &arguments.settings {
+        Some(path) => {
+            let text = crate::commands::read_text(path)?;
+            let read = parse_social(&path.display().to_string(), &text);
+            Some(read.map_err(|invalid| Failure::Input((*invalid).into()))?)
+        }
+        None => None,
     };
     if file.is_dir() {
         let scenario: Scenario = crate::commands::load_scenario(file)?;
@@ -79,7 +87,8 @@ fn situation(arguments: &Arguments) -> Result<Situation, Failure> {
             Some(at) => time_of_day(at, scenario.start)?,
             None => scenario.start,
         };
-        return Ok(Situation::of_scenario(&scenario, now));
+        let situation = Situation::of_scenario(&scenario, now);
+        return Ok((situation, settings.unwrap_or(scenario.social)));
     }
     let text = crate::commands::read_text(file)?;
     let recording = parse_recording(&text).map_err(|error| refused(file, error))?;
@@ -97,7 +106,9 @@ fn situation(arguments: &Arguments) -> Result<Situation, Failure> {
     };
     let frame = recording.at(time);
     let frame = frame.ok_or_else(|| refused(file, "the recording has no frames"))?;
-    Ok(Situation::of_frame(&name(), frame))
+    let name = file.file_stem().unwrap_or_default().to_string_lossy();
+    let config = settings.unwrap_or_default();
+    Ok((Situation::of_frame(&name, frame, &config), config))
 }
 
 /// `HH:MM` or `HH:MM:SS` of the scenario's day.

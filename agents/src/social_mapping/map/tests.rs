@@ -3,11 +3,11 @@
 use super::*;
 use crate::grid::{BLOCKED, FREE};
 use crate::social_mapping::object_space::{Outline, UsageCurve};
-use crate::social_mapping::scene::Activity;
-use crate::social_mapping::zones::Proxemics;
+use crate::social_mapping::scene::{Activity, Manner, Wall};
 use nalgebra::Vector2;
-use proptest::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI};
+
+mod updating;
 
 const NOON: f64 = 1_800_000_000.0;
 
@@ -25,6 +25,7 @@ fn person(name: &str, world_from_person: Isometry2<f64>) -> Person {
         world_from_person,
         velocity: Vector2::zeros(),
         radius: 0.25,
+        manner: Manner::default(),
     }
 }
 
@@ -242,7 +243,7 @@ fn the_space_of_a_walking_person_reaches_ahead_on_the_grid_only() {
     assert_cost(&standing, 5.0, 7.35, FREE);
     assert_cost(&walking, 5.0, 7.35, 2.0);
     assert_cost(&walking, 5.0, 5.05 + 0.65, BLOCKED);
-    assert_eq!(standing.people, walking.people);
+    assert_eq!(standing.people[0].personal, walking.people[0].personal);
     let config = SocialConfig {
         stretch: false,
         ..SocialConfig::default()
@@ -338,158 +339,55 @@ fn a_scene_that_makes_no_map_is_refused_and_the_map_survives() {
         error(&|s| s.walls.push(gap)),
         SceneError::Wall { index: 0 }
     ));
-    assert!(!mapper.update(noon(), &good).unwrap().changed);
+    assert!(mapper.update(noon(), &good).unwrap().dirty.is_empty());
 }
 
 #[test]
-fn changed_means_that_a_cost_differs() {
+fn layers_build_on_each_other_in_aps_order() {
     let mut scene = hall();
-    scene.people.push(person("ana", pose(5.0, 5.0, 0.0)));
+    scene.walls.push(wall((0.0, 8.0), (12.0, 8.0)));
+    let table = Outline::Rectangle(Vector2::new(2.0, 1.0));
+    scene
+        .objects
+        .push(object("table", "table", 3.0, 2.0, table));
+    scene.people = vec![person("ana", pose(8.05, 4.05, 0.0))];
     let mut mapper = SocialMapper::new(SocialConfig::default()).unwrap();
-    assert!(mapper.update(noon(), &scene).unwrap().changed);
-    assert!(!mapper.update(noon(), &scene).unwrap().changed);
-    scene.people[0].world_from_person = pose(5.0 + 1e-9, 5.0, 0.0);
-    assert!(
-        !mapper.update(noon(), &scene).unwrap().changed,
-        "no cell can tell"
-    );
-    scene.people[0].world_from_person = pose(5.2, 5.0, 0.0);
-    assert!(mapper.update(noon(), &scene).unwrap().changed);
-    scene.people.clear();
-    let map = mapper.update(noon(), &scene).unwrap();
-    assert!(map.changed && map.grid.costs.iter().all(|c| *c == FREE));
-}
-
-fn any_pose() -> impl Strategy<Value = Isometry2<f64>> {
-    (-1.0..13.0, -1.0..11.0, -4.0..4.0).prop_map(|(x, y, heading)| pose(x, y, heading))
-}
-
-prop_compose! {
-    fn any_people()(all in prop::collection::vec(
-        (any_pose(), -2.0..2.0, -2.0..2.0, 0.1..0.4f64), 0..6,
-    )) -> Vec<Person> {
-        all.into_iter().enumerate().map(|(i, (world_from_person, vx, vy, radius))| Person {
-            name: format!("p{i}"),
-            world_from_person,
-            velocity: Vector2::new(vx, vy),
-            radius,
-        }).collect()
-    }
-}
-
-prop_compose! {
-    fn any_objects()(all in prop::collection::vec(
-        (any_pose(), 0usize..4, any::<bool>(), 0.0..2.0, 0.0..2.0), 0..4,
-    )) -> Vec<Object> {
-        all.into_iter().enumerate().map(|(i, (world_from_object, class, round, x, y))| Object {
-            name: format!("o{i}"),
-            class: ["table", "tv", "bed", "plant"][class].to_owned(),
-            world_from_object,
-            outline: if round { Outline::Circle(x) } else { Outline::Rectangle(Vector2::new(x, y)) },
-        }).collect()
-    }
-}
-
-prop_compose! {
-    fn any_scene()(
-        people in any_people(),
-        objects in any_objects(),
-        walls in prop::sample::select(vec![
-            vec![],
-            vec![wall((3.0, 0.0), (3.0, 10.0)), wall((3.0, 4.0), (9.5, 6.2))],
-        ]),
-        interactions in prop::collection::vec((0usize..6, 0usize..6), 0..4),
-        activities in prop::collection::vec((0usize..4, -4000.0..4000.0, 0.0..2000.0f64), 0..3),
-        social in prop::bool::weighted(0.8),
-    ) -> SocialScene {
-        SocialScene {
-            people,
-            objects,
-            walls,
-            interactions: interactions.iter().map(|(a, b)| (format!("p{a}"), format!("p{b}"))).collect(),
-            activities: activities.iter().map(|(o, start, length)| Activity {
-                object: format!("o{o}"),
-                start: noon() + *start,
-                end: noon() + *start + *length,
-            }).collect(),
-            social,
-            ..hall()
-        }
-    }
-}
-
-/// A scene, and how the one before is changed into it: afresh, by one person, by time alone.
-#[derive(Debug, Clone)]
-enum Turn {
-    Another(SocialScene),
-    OnePersonMoves(prop::sample::Index, Isometry2<f64>),
-    OnePersonLeaves(prop::sample::Index),
-    TimePasses(f64),
-}
-
-fn any_turn() -> impl Strategy<Value = Turn> {
-    prop_oneof![
-        any_scene().prop_map(Turn::Another),
-        (any::<prop::sample::Index>(), any_pose()).prop_map(|(i, p)| Turn::OnePersonMoves(i, p)),
-        any::<prop::sample::Index>().prop_map(Turn::OnePersonLeaves),
-        (0.0..3000.0f64).prop_map(Turn::TimePasses),
-    ]
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(48))]
-
-    #[test]
-    fn updating_equals_drawing_anew(
-        start in any_scene(), turns in prop::collection::vec(any_turn(), 1..8),
-    ) {
-        let (mut scene, mut now) = (start, noon());
-        let mut mapper = SocialMapper::new(SocialConfig::default()).unwrap();
-        let mut before = mapper.update(now, &scene).unwrap();
-        for turn in turns {
-            match turn {
-                Turn::Another(next) => scene = next,
-                Turn::OnePersonMoves(i, to) if !scene.people.is_empty() => {
-                    let i = i.index(scene.people.len());
-                    scene.people[i].world_from_person = to;
-                }
-                Turn::OnePersonLeaves(i) if !scene.people.is_empty() => {
-                    scene.people.remove(i.index(scene.people.len()));
-                }
-                Turn::TimePasses(seconds) => now = now + seconds,
-                Turn::OnePersonMoves(..) | Turn::OnePersonLeaves(_) => {}
-            }
-            let updated = mapper.update(now, &scene).unwrap();
-            let anew = SocialMapper::new(SocialConfig::default()).unwrap().update(now, &scene).unwrap();
-            prop_assert!(updated.grid == anew.grid);
-            prop_assert_eq!(&updated.people, &anew.people);
-            prop_assert_eq!(&updated.objects, &anew.objects);
-            prop_assert_eq!(&updated.rejected, &anew.rejected);
-            // The walls drawn anew count as a change even where they look the same.
-            prop_assert!(updated.changed || updated.grid == before.grid);
-            prop_assert!(updated.grid.costs.iter().all(|c| *c >= FREE));
-            before = updated;
-        }
-    }
-
-    #[test]
-    fn the_grid_and_the_zone_function_agree(people in any_people()) {
-        let scene = SocialScene { people, ..hall() };
-        let config = SocialConfig { stretch: false, ..SocialConfig::default() };
-        let map = SocialMapper::new(config).unwrap().update(noon(), &scene).unwrap();
-        let poses: Vec<_> = scene.people.iter().map(|p| p.world_from_person).collect();
-        for row in 0..map.grid.height {
-            for column in 0..map.grid.width {
-                let cell = (column, row);
-                let centre = map.grid.centre(cell);
-                let touches = scene.people.iter().any(|p| {
-                    (position(p) - centre).norm() <= p.radius + scene.robot_radius + 1e-9
-                });
-                if !touches {
-                    let zone = Proxemics::default().zone_at(centre, &poses);
-                    prop_assert!(map.grid.cost(cell).total_cmp(&zone.cost()).is_eq());
-                }
-            }
-        }
-    }
+    assert_eq!(mapper.layer(Layer::Master), None);
+    // On the wall and beside it, on the table and beside it, on ana and ahead of her.
+    let places = [
+        (6.05, 8.05),
+        (6.05, 7.75),
+        (3.05, 2.05),
+        (4.15, 2.05),
+        (8.05, 4.05),
+        (9.05, 4.05),
+    ];
+    let mut rows = |scene: &SocialScene| {
+        mapper.update(noon(), scene).unwrap();
+        Layer::ALL
+            .map(|layer| {
+                let grid = mapper.layer(layer).unwrap();
+                let cost = |(x, y)| grid.cost(grid.cell_at(Point2::new(x, y)).unwrap());
+                let costs = places.map(|place| format!("{:4.1}", cost(place)));
+                format!("{:14}{}", layer.name(), costs.join(" "))
+            })
+            .join("\n")
+    };
+    expect_test::expect![[r"
+        static         inf  1.0  1.0  1.0  1.0  1.0
+        obstacles      inf  1.0  inf  1.0  inf  1.0
+        people_filter  inf  1.0  inf  1.0  1.0  1.0
+        inflation      inf  inf  inf  inf  1.0  1.0
+        social         1.0  1.0  1.5  1.5  inf  4.0
+        master         inf  inf  inf  inf  inf  4.0"]]
+    .assert_eq(&rows(&scene));
+    scene.social = false;
+    expect_test::expect![[r"
+        static         inf  1.0  1.0  1.0  1.0  1.0
+        obstacles      inf  1.0  inf  1.0  inf  1.0
+        people_filter  inf  1.0  inf  1.0  inf  1.0
+        inflation      inf  inf  inf  inf  inf  1.0
+        social         1.0  1.0  1.0  1.0  1.0  1.0
+        master         inf  inf  inf  inf  inf  1.0"]]
+    .assert_eq(&rows(&scene));
 }

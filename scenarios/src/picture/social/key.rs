@@ -2,9 +2,9 @@
 //! that is not drawn.
 
 use super::super::canvas::{FAINT, INK, PEOPLE, heat, line, number, rectangle, text};
-use super::{GROUP, Show, cost_colour, density_colour};
-use crate::situation::{Mapped, Situation};
-use agents::social_mapping::SocialConfig;
+use super::{GROUP, Show, cost_colour, density_colour, passing};
+use crate::situation::Situation;
+use agents::social_mapping::{SocialConfig, Update};
 use svg::node::element::Group;
 
 /// From line to line, px.
@@ -15,7 +15,7 @@ const LINE: f64 = 20.0;
 pub(super) fn column(
     corner: [f64; 2],
     situation: &Situation,
-    mapped: &Mapped,
+    update: &Update,
     config: &SocialConfig,
     show: Show,
 ) -> (Group, f64) {
@@ -63,7 +63,7 @@ pub(super) fn column(
             ));
             y += 15.0 + LINE;
         }
-        Show::Costs => {
+        Show::Costs(_) => {
             let colour = |share: f64| cost_colour((1.0 + 3.0 * share) as f32).unwrap_or_default();
             column = column.add(heading(y, "Cost of a place")).add(bar(
                 y + 8.0,
@@ -94,11 +94,27 @@ pub(super) fn column(
         column = column.add(stroke).add(words(40.0, y, &name, INK));
         y += LINE;
     }
+    if passing::is_wanted(update) {
+        let zone = rectangle(left, y - 10.0, 28.0, 12.0)
+            .set("fill", passing::WANTED)
+            .set("fill-opacity", "0.45");
+        column = column
+            .add(zone)
+            .add(words(40.0, y, "cooperation zone", INK));
+        y += LINE;
+    }
+    if passing::is_shut(update) {
+        let bar = line(left, y - 4.0, left + 28.0, y - 4.0)
+            .set("stroke", passing::SHUT)
+            .set("stroke-width", "4");
+        column = column.add(bar).add(words(40.0, y, "no passage here", INK));
+        y += LINE;
+    }
     y += 6.0;
-    let count = mapped.update.people.len();
+    let count = update.people.len();
     column = column.add(heading(
         y,
-        &format!("People: {count}, groups: {}", mapped.groups.len()),
+        &format!("People: {count}, groups: {}", update.groups.len()),
     ));
     y += LINE;
     let body = svg::node::element::Circle::new()
@@ -116,7 +132,7 @@ pub(super) fn column(
                 .set("stroke-width", "2"),
         );
     y += LINE;
-    if !mapped.groups.is_empty() {
+    if !update.groups.is_empty() {
         let spoke = line(left, y - 4.0, left + 28.0, y - 4.0)
             .set("stroke", GROUP)
             .set("stroke-width", "2.2");
@@ -133,7 +149,7 @@ pub(super) fn column(
             .add(words(40.0, y, "personal space of a group", INK));
         y += LINE;
     }
-    if !mapped.update.objects.is_empty() && show == Show::Density {
+    if !update.objects.is_empty() && show == Show::Density {
         y += 6.0;
         let curve = &config.usage;
         let ends = [
@@ -145,7 +161,7 @@ pub(super) fn column(
             .add(bar(y + 8.0, &heat, [&ends[0], &ends[1]]).set("fill-opacity", "0.6"));
         y += 56.0;
     }
-    let left_out = mapped.update.rejected.len();
+    let left_out = update.rejected.len();
     if left_out > 0 {
         column = column.add(words(
             0.0,

@@ -1,0 +1,58 @@
+//! The table `[social]`: every figure by name, what is not given by default, and what cannot be.
+
+use super::*;
+use agents::social_mapping::groups::Method;
+use agents::social_mapping::{AsymmetricGaussian, SocialConfig};
+
+/// The example of the book.
+fn example() -> &'static str {
+    let page = include_str!("../../../../docs/src/social-maps.md");
+    let start = page.find("[social]\n").expect("an example");
+    let end = page[start..].find("```").expect("its end");
+    &page[start..start + end]
+}
+
+#[test]
+fn the_example_of_the_book_is_read() {
+    let text = format!("{TWO_ROOMS}\n{}", example());
+    let social = parse(&text).expect("a good file").social;
+    assert_eq!(social.proxemics.shape, AsymmetricGaussian::HALL);
+    assert_eq!(social.grouping.method, Method::Facing);
+    assert!(social.walls.is_some());
+    assert_eq!(social.cooperation.keys().collect::<Vec<_>>(), ["guide"]);
+    assert!((social.usage.ramp - 1800.0).abs() < 1e-9);
+    assert_eq!(
+        parse(TWO_ROOMS).expect("a good file").social,
+        SocialConfig::default()
+    );
+}
+
+#[test]
+fn what_social_mapping_cannot_use_is_told_with_its_place() {
+    let with = |social: &str| match parse(&format!("{TWO_ROOMS}\n{social}")) {
+        Ok(_) => Vec::new(),
+        Err(invalid) => {
+            let told =
+                |problem: &crate::scenario::Problem| format!("{}: {}", problem.line, problem.kind);
+            invalid.problems.iter().map(told).collect::<Vec<_>>()
+        }
+    };
+    let line = TWO_ROOMS.lines().count() + 2;
+    let [problem] = &with("[social]\nresolutoin = 0.1")[..] else {
+        panic!("one problem");
+    };
+    assert!(
+        problem.starts_with(&format!("{}: unknown field `resolutoin`", line + 1)),
+        "{problem}"
+    );
+    let [problem] = &with("[social.proxemics]\nshape = \"hal\"")[..] else {
+        panic!("one problem");
+    };
+    assert!(
+        problem.contains("there are no widths `hal`; there are `hall` and `printed`"),
+        "{problem}"
+    );
+    let problems = with("[social]\nresolution = 0\nclearance_cost = -1");
+    assert_eq!(problems.len(), 2, "{problems:?}");
+    assert!(problems[0].contains("resolution must be a finite length greater than 0"));
+}
