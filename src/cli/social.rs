@@ -31,10 +31,18 @@ pub(crate) enum SocialAction {
         json: bool,
     },
     /// Say how little the robot's place suits it, scene by scene: 0 nobody minds, 1 the worst
-    #[command(after_help = "Example:\n  cortex social comfort scenes.json --json")]
+    #[command(
+        after_help = "With --folds, the figures are also chosen anew on all scenes but a part, for each of K \
+        parts,\nand held against people's ratings on that part.\n\n\
+        Examples:\n  cortex social comfort scenes.json --json\n  \
+        cortex social comfort scenes.json --folds 5"
+    )]
     Comfort {
         /// One scene a line (JSON), the robot at its origin
         file: PathBuf,
+        /// Cross-validate against people's ratings in K parts
+        #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(2..))]
+        folds: Option<u16>,
         /// A line of JSON for each scene
         #[arg(long)]
         json: bool,

@@ -350,6 +350,7 @@ fn what_cannot_be_used_is_refused_with_what_could() {
             &["social", "schedule", &broken, "--instance", "nobody-here"],
             "no instance `nobody-here` is running",
         ),
+        (&["social", "comfort", &file, "--folds", "1"], "2.."),
         (&["experiment", "fd-tabel1"], "did you mean `fd-table1`?"),
     ] {
         let (code, _, err) = cortex(arguments);

@@ -50,7 +50,7 @@ pub(super) fn run(file: &Path, json: bool) -> Result<Answer, Failure> {
 
 /// Spearman's rank correlation, equals sharing their mean rank; `None` where one side has no two
 /// different values.
-fn rank_correlation(pairs: &[(f64, f64)]) -> Option<f64> {
+pub(super) fn rank_correlation(pairs: &[(f64, f64)]) -> Option<f64> {
     let ranks = |values: Vec<f64>| -> Vec<f64> {
         let mut order: Vec<usize> = (0..values.len()).collect();
         order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));

@@ -1,6 +1,7 @@
 //! `cortex social`: people and the space they need, from recordings and scenes.
 
 mod comfort;
+mod folds;
 mod groups;
 mod picture;
 mod schedule;
@@ -13,7 +14,10 @@ use std::path::Path;
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     match &arguments.action {
         SocialAction::Groups { file, method, json } => groups::run(file, *method, *json),
-        SocialAction::Comfort { file, json } => comfort::run(file, *json),
+        SocialAction::Comfort { file, folds, json } => match folds {
+            Some(folds) => folds::run(file, usize::from(*folds), *json),
+            None => comfort::run(file, *json),
+        },
         SocialAction::Schedule { file, instance } => schedule::run(file, instance),
         SocialAction::Density(arguments) => picture::run(arguments, Show::Density),
         SocialAction::Map { picture, layer } => picture::run(picture, Show::Costs(*layer)),
