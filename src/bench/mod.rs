@@ -1,6 +1,7 @@
 //! Measuring what Cortex is made of: the shared graph beside raw iceoryx2 and a copy on the heap, the
-//! planner from text to plan, rules beside other matchers. It guarantees that a figure and the one it
-//! is compared with come from the same run, taken in turns where both are short.
+//! planner from text to plan, rules beside other matchers, social maps beside numpy. It guarantees
+//! that a figure and the one it is compared with come from the same run, taken in turns where both are
+//! short.
 //!
 //! Who measures the graph starts a store and peers by executing the program again, in an instance of
 //! its own, and ends and removes all of them.
@@ -17,16 +18,20 @@ mod hall;
 mod indoor;
 mod peer;
 mod plan;
+mod quantity;
 mod reads;
 mod replan;
 mod replica;
 mod rules;
+mod social;
 mod whole;
 
 pub(crate) use figure::{Figure, table};
 pub(crate) use peer::play;
 pub(crate) use plan::plans;
-pub(crate) use rules::{Quantity, rules, table as rules_table};
+pub(crate) use quantity::{Quantity, table as quantities_table};
+pub(crate) use rules::rules;
+pub(crate) use social::social;
 
 use crate::Failure;
 use hall::Hall;

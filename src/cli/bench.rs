@@ -31,6 +31,9 @@ pub(crate) enum BenchAction {
         Example:\n  cortex bench rules"
     )]
     Rules,
+    /// Social maps: people's density, updates, crowds, outlines
+    #[command(after_help = "Takes a few seconds.\n\nExample:\n  cortex bench social --json")]
+    Social,
     /// The planner: from the text of rules, world and goal to the plan
     #[command(after_help = "Takes a few seconds.\n\nExample:\n  cortex bench plan --tasks tasks")]
     Plan {

@@ -12,7 +12,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
             (_, true) => Effort::THOROUGH,
             _ => Effort::NORMAL,
         })?,
-        BenchAction::Rules => return rules(arguments.json),
+        BenchAction::Rules => return tell(&bench::rules()?, arguments.json),
+        BenchAction::Social => return tell(&bench::social()?, arguments.json),
         BenchAction::Plan { tasks } => bench::plans(tasks.as_deref())?,
     };
     if arguments.json {
@@ -24,13 +25,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     Ok(Answer::Yes)
 }
 
-fn rules(as_json: bool) -> Result<Answer, Failure> {
-    let quantities = bench::rules()?;
+fn tell(quantities: &[bench::Quantity], as_json: bool) -> Result<Answer, Failure> {
     if as_json {
         let rows: Vec<_> = quantities.iter().map(bench::Quantity::to_json).collect();
         print_json(&rows.into())?;
     } else {
-        print(&bench::rules_table(&quantities))?;
+        print(&bench::quantities_table(quantities))?;
     }
     Ok(Answer::Yes)
 }

@@ -58,3 +58,32 @@ fn the_graphs_figures_are_all_there_and_no_process_or_memory_of_theirs_is_left()
     let left: Vec<_> = fs::read_dir(user.path()).unwrap().collect();
     assert!(left.is_empty(), "{left:?}");
 }
+
+#[test]
+fn the_figures_of_social_maps_are_all_there_each_beside_something() {
+    let output = Program::run(&["bench", "social", "--json"]);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    let rows: Vec<Value> = serde_json::from_slice(&output.stdout).unwrap();
+    let names: Vec<&str> = rows.iter().map(|f| f["name"].as_str().unwrap()).collect();
+    assert_eq!(
+        names,
+        [
+            "density_100",
+            "density_100_one_moved",
+            "density_1000",
+            "contours_100",
+            "map_100_one_moved",
+            "map_1000",
+        ]
+    );
+    for row in &rows {
+        let [value, peer, ratio] =
+            ["value", "peer", "ratio"].map(|field| row[field].as_f64().unwrap());
+        assert!(
+            value > 0.0 && (ratio - peer / value).abs() < 1e-9 * ratio,
+            "{row}"
+        );
+        assert!(!row["beside"].as_str().unwrap().is_empty(), "{row}");
+    }
+}

@@ -4,13 +4,12 @@
 mod indoor;
 mod peers;
 
+use super::quantity::Quantity;
 use crate::Failure;
 use dsr::{Graph, NodeId, Snapshot, Time, Transaction};
 use grammar::{Binding, Grammar, Matcher, Rewriter, Watch, WorkingGraph, parse_grammar};
 use indoor::Indoor;
 use peers::Peers;
-use serde_json::{Value as Json, json};
-use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -19,76 +18,6 @@ const RULES: &str = include_str!("patterns.aggl");
 const SIZES: [(usize, &str); 3] = [(1000, "1k"), (10_000, "10k"), (100_000, "100k")];
 /// How long one quantity is measured.
 const SPAN: Duration = Duration::from_millis(200);
-
-/// One measured quantity.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Quantity {
-    name: String,
-    value: f64,
-    unit: &'static str,
-    /// The same by another engine, and whether that is a lower bound, because it was ended.
-    peer: Option<(f64, bool)>,
-}
-
-impl Quantity {
-    fn new(name: String, value: f64, unit: &'static str) -> Self {
-        Self {
-            name,
-            value,
-            unit,
-            peer: None,
-        }
-    }
-
-    /// How many times faster than the peer.
-    fn ratio(&self) -> Option<f64> {
-        self.peer.map(|(peer, _)| peer / self.value)
-    }
-
-    pub(crate) fn to_json(&self) -> Json {
-        json!({
-            "name": self.name,
-            "value": self.value,
-            "unit": self.unit,
-            "peer": self.peer.map(|(peer, _)| peer),
-            "ratio": self.ratio(),
-        })
-    }
-}
-
-/// The quantities for people.
-pub(crate) fn table(quantities: &[Quantity]) -> String {
-    let number = |number: f64| match number.abs() {
-        size if size >= 1000.0 => format!("{number:.0}"),
-        size if size >= 10.0 => format!("{number:.1}"),
-        _ => format!("{number:.3}"),
-    };
-    let mut text = super::figure::host();
-    // Writing to a string does not fail.
-    let _ = writeln!(
-        text,
-        "\n{:<32}{:>12} {:<13}{:>14}{:>12}",
-        "", "ours", "", "peer's", "faster"
-    );
-    for quantity in quantities {
-        let bound = quantity
-            .peer
-            .filter(|(_, bound)| *bound)
-            .map_or("", |_| ">");
-        let [peer, ratio] = [quantity.peer.map(|(peer, _)| peer), quantity.ratio()].map(|value| {
-            value.map_or_else(String::new, |value| format!("{bound}{}", number(value)))
-        });
-        let Quantity {
-            name, value, unit, ..
-        } = quantity;
-        let value = number(*value);
-        let _ = writeln!(
-            text,
-            "{name:<32}{value:>12} {unit:<13}{peer:>14}{ratio:>12}"
-        );
-    }
-    text
-}
 
 /// Microseconds that `work` takes: the median of as many runs as fit into the span.
 fn median<T>(mut work: impl FnMut() -> Result<T, Failure>) -> Result<f64, Failure> {
@@ -375,15 +304,6 @@ fn parsing(quantities: &mut Vec<Quantity>) -> Result<(), Failure> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_peer_that_was_ended_is_told_as_a_lower_bound() {
-        let mut quantity = Quantity::new("all_deliver_100k_vf2".to_owned(), 20.0, "us");
-        assert_eq!(quantity.to_json()["ratio"], Json::Null);
-        quantity.peer = Some((60_000.0, true));
-        assert_eq!(quantity.to_json()["ratio"], 3000.0);
-        assert!(table(&[quantity]).contains(">3000"));
-    }
 
     #[test]
     fn peers_read_a_left_side_as_words() {
