@@ -176,6 +176,7 @@ pub(super) fn blocking(
     let bare = BareClient::open(hall.instance()).map_err(Failure::internal)?;
     let mut session = hall.session("committer")?;
     session.set_spin(Duration::ZERO);
+    let all = peer::sit(0)?;
     let (mut ours, mut raw) = (Vec::new(), Vec::new());
     for turn in 0..effort.turns {
         time(200, &mut raw, |word| {
@@ -187,6 +188,7 @@ pub(super) fn blocking(
         })?;
     }
     drop(bare);
+    peer::stand(&all)?;
     echo.end()?;
     figures.push(Figure {
         name: "commit_ack_block",

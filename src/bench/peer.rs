@@ -7,6 +7,7 @@ use dsr::{
     Store, Time, Transaction, Value,
 };
 use nalgebra::{Isometry2, Vector2};
+use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use std::io::{Read, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -71,6 +72,26 @@ pub(super) fn clock() -> u64 {
     time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64
 }
 
+/// Keeps the calling thread on one of the processors that it may use; all of those. Where the kernel
+/// puts processes that wake each other decides over the time that it takes more than anything that they
+/// do; so those that are compared sit alike, each beside the one that it wakes, not on the same
+/// processor.
+pub(super) fn sit(place: usize) -> Result<CpuSet, Failure> {
+    let all = sched_getaffinity(None).map_err(Failure::internal)?;
+    let mut usable = (0..CpuSet::MAX_CPU).filter(|&processor| all.is_set(processor));
+    if let Some(processor) = usable.nth(place) {
+        let mut one = CpuSet::new();
+        one.set(processor);
+        stand(&one)?;
+    }
+    Ok(all)
+}
+
+/// Lets the calling thread use those processors.
+pub(super) fn stand(on: &CpuSet) -> Result<(), Failure> {
+    sched_setaffinity(None, on).map_err(Failure::internal)
+}
+
 pub(super) fn attach(instance: &Instance, agent: &str) -> Result<Session, Failure> {
     Session::attach(instance, agent, PATIENCE).map_err(Failure::internal)
 }
@@ -116,6 +137,9 @@ fn store(
         committed.map_err(Failure::internal)?;
     }
     store.set_spin(spin);
+    if spin.is_zero() {
+        sit(1)?;
+    }
     let ended = end_of_input();
     say("ready")?;
     while !ended.load(Ordering::Acquire) {
@@ -127,6 +151,9 @@ fn store(
 
 fn bare(instance: &Instance, spin: Duration) -> Result<(), Failure> {
     let server = BareServer::open(instance).map_err(Failure::internal)?;
+    if spin.is_zero() {
+        sit(1)?;
+    }
     let ended = end_of_input();
     say("ready")?;
     while !ended.load(Ordering::Acquire) {
