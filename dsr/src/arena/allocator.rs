@@ -4,7 +4,7 @@
 
 use super::{Address, Arena, FIRST_BLOCK, Word};
 use crate::shm::Segment;
-use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
+use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -29,6 +29,9 @@ impl Retired {
 
 /// Versions are as old as the end of the span of so long that they were superseded in.
 const SPAN: Duration = Duration::from_millis(100);
+
+/// Words of a cache line.
+const LINE: usize = 8;
 
 /// A commit usually takes fewer blocks.
 const USUAL: usize = 64;
@@ -78,12 +81,14 @@ pub(crate) struct Allocator {
     free: Vec<Vec<Address>>,
     retired: VecDeque<Retired>,
     retired_words: usize,
-    /// Blocks given out since the last version: still private to the writer.
-    fresh: FxHashSet<Address>,
-    /// All blocks given out since the last version, with their words.
+    /// Blocks given out since the last version, with their words: still private to the writer.
     given: Vec<(Address, usize)>,
+    /// Once they are many, those of them that were not given up again.
+    fresh: Option<FxHashSet<Address>>,
     /// Blocks retired since the last version, taken back if the commit fails.
     pending: Vec<(Address, usize)>,
+    /// The size classes of the blocks that the last commit was given, where they were not many.
+    last: Vec<(usize, usize)>,
     in_use: usize,
     /// Versions that leases keep.
     leased: Vec<u64>,
@@ -108,9 +113,10 @@ impl Allocator {
             free: Vec::new(),
             retired: VecDeque::new(),
             retired_words: 0,
-            fresh: FxHashSet::default(),
             given: Vec::new(),
+            fresh: None,
             pending: Vec::new(),
+            last: Vec::new(),
             in_use: 0,
             leased: Vec::new(),
             young: FxHashMap::default(),
@@ -134,8 +140,14 @@ impl Allocator {
             None => self.bump(arena, size)?,
         };
         self.in_use += size;
-        self.fresh.insert(address);
         self.given.push((address, words));
+        match &mut self.fresh {
+            Some(fresh) => drop(fresh.insert(address)),
+            None if self.given.len() > USUAL => {
+                self.fresh = Some(self.given.iter().map(|(address, _)| *address).collect());
+            }
+            None => {}
+        }
         Ok(address)
     }
 
@@ -168,18 +180,54 @@ impl Allocator {
         Ok(address)
     }
 
+    /// Brings the blocks that a commit like the last one would be given into the processor's cache. They
+    /// have not been used for as long as the history is, and fetching them takes as long as all else
+    /// of a small commit; now nobody waits for it.
+    pub(crate) fn prepare(&self, arena: &Arena) {
+        let mut next = self.next;
+        for (index, &(class, size)) in self.last.iter().enumerate() {
+            let before = self.last[..index].iter();
+            let before = before.filter(|(other, _)| *other == class).count();
+            let free = self.free.get(class).map_or(&[][..], Vec::as_slice);
+            let address = match free.len().checked_sub(before + 1) {
+                Some(at) => free[at],
+                None if next + size as Address <= self.reserved => {
+                    next += size as Address;
+                    next - size as Address
+                }
+                None => continue,
+            };
+            // What a free block holds nobody reads.
+            for line in arena.block(address, size).unwrap_or(&[]).chunks(LINE) {
+                line[0].store(0);
+            }
+        }
+    }
+
     /// Whether the block is private to the writer still, so that it may be changed in place.
     pub(crate) fn is_fresh(&self, address: Address) -> bool {
-        self.fresh.contains(&address)
+        match &self.fresh {
+            Some(fresh) => fresh.contains(&address),
+            None => self.given.iter().any(|(given, _)| *given == address),
+        }
     }
 
     /// Gives a block up: at once if no version reaches it, else once those are unreadable.
     pub(crate) fn retire(&mut self, address: Address, words: usize) {
-        if self.fresh.remove(&address) {
+        if self.take_fresh(address) {
             self.release(address, words);
         } else {
             self.pending.push((address, words));
         }
+    }
+
+    /// Takes a block from those that are private to the writer, if it is one.
+    fn take_fresh(&mut self, address: Address) -> bool {
+        if let Some(fresh) = &mut self.fresh {
+            return fresh.remove(&address);
+        }
+        let at = self.given.iter().position(|(given, _)| *given == address);
+        at.map(|at| self.given.remove(at)).is_some()
     }
 
     fn release(&mut self, address: Address, words: usize) {
@@ -196,12 +244,22 @@ impl Allocator {
     pub(crate) fn committed(&mut self, old: u64, new: u64) {
         if !self.leased.is_empty() {
             for (address, _) in &self.given {
-                if self.fresh.contains(address) {
+                if self
+                    .fresh
+                    .as_ref()
+                    .is_none_or(|fresh| fresh.contains(address))
+                {
                     self.young.insert(*address, new);
                 }
             }
         }
-        self.forget_given();
+        self.last.clear();
+        if self.given.len() <= USUAL {
+            let given = self.given.iter();
+            self.last.extend(given.map(|&(_, words)| size_class(words)));
+        }
+        self.given.clear();
+        self.fresh = None;
         for (address, words) in self.pending.drain(..) {
             self.retired_words += size_class(words).1;
             self.retired.push_back(Retired {
@@ -217,17 +275,6 @@ impl Allocator {
         }
     }
 
-    /// From now on no block is private to the writer.
-    fn forget_given(&mut self) {
-        self.given.clear();
-        if self.fresh.capacity() > 2 * USUAL {
-            // Clearing a set costs what it once held: the largest commit would slow all that follow.
-            self.fresh = FxHashSet::with_capacity_and_hasher(USUAL, FxBuildHasher);
-        } else {
-            self.fresh.clear();
-        }
-    }
-
     /// Tells the time, by a clock that does not run back.
     pub(crate) fn set_clock(&mut self, now: Duration) {
         self.now = self.now.max(now);
@@ -239,11 +286,15 @@ impl Allocator {
         // From the newest back: a block that was given up and given out again counts with its
         // last size, which shares its class with the others.
         while let Some((address, words)) = self.given.pop() {
-            if self.fresh.remove(&address) {
+            if self
+                .fresh
+                .as_mut()
+                .is_none_or(|fresh| fresh.remove(&address))
+            {
                 self.release(address, words);
             }
         }
-        self.forget_given();
+        self.fresh = None;
     }
 
     /// Gives up old versions until what only they reach takes at most `keep_bytes`, and those
@@ -391,7 +442,7 @@ mod tests {
             } else {
                 allocator.abandoned();
             }
-            assert!(allocator.fresh.capacity() <= 2 * USUAL);
+            assert!(allocator.fresh.is_none());
         }
     }
 

@@ -238,6 +238,37 @@ pub(crate) fn insert(
     writer.write(&encode(true, &[(left_key, left), (right_key, right)]))
 }
 
+/// Sets what `key` leads to, if it leads to something already; the new root.
+pub(crate) fn set(
+    writer: &mut Writer,
+    root: Address,
+    key: Key,
+    word: u64,
+) -> Result<Option<Address>, Full> {
+    if root == 0 {
+        return Ok(None);
+    }
+    let Ok(block) = Block::at(writer.arena(), root) else {
+        return Ok(None);
+    };
+    let (len, inner) = (words_of(block.len()), block.inner);
+    let index = if inner {
+        block.child_of(key)
+    } else {
+        block.lower_bound(key)
+    };
+    let below = (index < block.len()).then(|| (block.key(index), block.word(index)));
+    let new = match below {
+        Some((_, child)) if inner => set(writer, child, key, word)?,
+        Some((found, _)) if found == key => Some(word),
+        _ => None,
+    };
+    let Some(new) = new else {
+        return Ok(None);
+    };
+    writer.change(root, len, words_of(index) + 2, new).map(Some)
+}
+
 type Split = Option<(Key, Address)>;
 
 fn insert_at(

@@ -43,7 +43,8 @@ fn rank(bitmap: u64, bit: u64) -> usize {
     (bitmap & ((1 << bit) - 1)).count_ones() as usize
 }
 
-fn to_record(address: Address) -> Link {
+/// The link to the record at `address`.
+pub(crate) fn to_record(address: Address) -> Link {
     address << 1 | 1
 }
 
@@ -161,26 +162,35 @@ pub(crate) fn insert(
         return join(writer, (other, link), (id, to_record(record)));
     }
     let level = level_of(link);
+    let bit = slot(id, level);
+    if let Some((len, at, link)) = way(writer.arena(), address, id, level) {
+        let below = insert(writer, link, id, record)?;
+        if below == link {
+            return Ok(to_block(address, level));
+        }
+        return Ok(to_block(writer.change(address, len, at, below)?, level));
+    }
     let mut block = Block::read(writer, address);
     if block.words[1] != prefix(id, level) {
         // Any id below the block will do; above it they are all alike.
         let other = block.words[1] << (BITS * (level + 1));
         return join(writer, (other, link), (id, to_record(record)));
     }
-    let bit = slot(id, level);
     let old = block.len;
-    if block.has(bit) {
-        let at = block.at(bit);
-        let below = insert(writer, block.words[at], id, record)?;
-        if below == block.words[at] {
-            return Ok(link);
-        }
-        block.words[at] = below;
-    } else {
-        block.insert(bit, to_record(record));
-    }
+    block.insert(bit, to_record(record));
     let address = writer.replace(address, old, block.words())?;
     Ok(to_block(address, level))
+}
+
+/// Where the block at `address` leads on to `id`, if it does: the words of the block, which of them is the
+/// link, and that.
+fn way(arena: &Arena, address: Address, id: u64, level: u64) -> Option<(usize, usize, Link)> {
+    let words = arena.from(address)?;
+    let (bitmap, bit) = (words.first()?.load(), slot(id, level));
+    let leads = bitmap & (1 << bit) != 0 && words.get(1)?.load() == prefix(id, level);
+    let at = HEADER + rank(bitmap, bit);
+    let len = HEADER + bitmap.count_ones() as usize;
+    Some((len, at, words.get(at)?.load())).filter(|_| leads)
 }
 
 /// A block over two links whose ids differ, at the level of their highest difference.
@@ -288,8 +298,8 @@ mod tests {
     use super::*;
     use crate::arena::allocator::{Growth, HeapGrowth};
 
-    const BLOCK: Address = 70_000;
-    const RECORD: Address = 80_000;
+    const BLOCK: Address = 90_000;
+    const RECORD: Address = 100_000;
 
     /// An arena with a block of as many links as one can have, all to `link`, and a record.
     fn arena(link: Link) -> Arena {

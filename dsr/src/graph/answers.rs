@@ -44,16 +44,21 @@ pub(crate) struct Answered {
 }
 
 impl Answered {
-    fn words(&self) -> Vec<u64> {
+    fn encode(&self, words: &mut Vec<u64>) {
         let commit = &self.commit;
-        let mut words = vec![
+        words.extend([
             self.id.sequence,
             commit.version.0,
             commit.time.nanoseconds().cast_unsigned(),
             commit.created.len() as u64,
-        ];
+        ]);
         words.extend(commit.created.iter().map(|id| id.0));
-        words
+    }
+
+    /// The words of the record at `address`.
+    fn len(arena: &Arena, address: Address) -> Result<usize, Address> {
+        let count = arena.from(address).and_then(|words| words.get(HEAD - 1));
+        Ok(HEAD + count.ok_or(address)?.load() as usize)
     }
 
     fn read(arena: &Arena, client: u64, address: Address) -> Result<Self, Address> {
@@ -118,10 +123,14 @@ impl Work<'_> {
             }
         }
         self.forget(client)?;
-        let address = self.graph.writer.write(&answered.words());
-        let address = self.room(address)?;
+        let put = self.graph.writer.put(None, |words| answered.encode(words));
+        let address = self.room(put)?;
+        let (root, key) = (self.root.answers, [client, 0]);
         let writer = &mut self.graph.writer;
-        let answers = tree::insert(writer, self.root.answers, [client, 0], address);
+        let answers = match tree::set(writer, root, key, address) {
+            Ok(None) => tree::insert(writer, root, key, address),
+            known => known.map(Option::unwrap_or_default),
+        };
         self.root.answers = self.room(answers)?;
         Ok(())
     }
@@ -131,7 +140,7 @@ impl Work<'_> {
         let arena = &self.graph.writer.arena;
         let found = read(tree::find(arena, self.root.answers, [client, 0]))?;
         if let Some(address) = found {
-            let words = read(Answered::read(arena, client, address))?.words().len();
+            let words = read(Answered::len(arena, address))?;
             self.graph.writer.retire(address, words);
         }
         Ok(())
@@ -160,6 +169,7 @@ mod tests {
 
     fn commit(graph: &mut Graph, id: TransactionId, transaction: &Transaction) -> Commit {
         let done = graph.commit_once(transaction, "agent", Time::default(), Some(id));
+        graph.settle();
         done.unwrap().0
     }
 

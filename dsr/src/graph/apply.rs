@@ -5,6 +5,7 @@
 mod attributes;
 mod edges;
 mod nodes;
+mod touched;
 
 use super::image::{AttributeImage, Image};
 use super::{Answered, Graph, TransactionId};
@@ -17,8 +18,8 @@ use crate::{
     NodeId, NodeRef, Operation, Owner, Precondition, ReadError, Refusal, RuleApplication, Schema,
     SchemaError, Snapshot, Time, Touch, TypeId, Value, Version,
 };
-use std::collections::BTreeMap;
 use std::sync::Arc;
+use touched::Touched;
 
 /// The name that the store itself commits under, which no agent may use.
 pub(crate) const STORE: &str = "store";
@@ -28,9 +29,6 @@ impl From<SchemaError> for Refusal {
         Self::SchemaViolation(error.to_string())
     }
 }
-
-/// What a commit has touched so far.
-type Touched<K, V> = BTreeMap<K, (V, Touch, Vec<AttributeId>)>;
 
 /// What a written attribute remembers.
 #[derive(Debug, Clone, Copy)]
@@ -65,37 +63,6 @@ pub(super) struct Work<'a> {
     by_rule: bool,
 }
 
-fn touch<K: Ord, V>(
-    touched: &mut Touched<K, V>,
-    key: K,
-    value: V,
-    how: Touch,
-    what: Option<AttributeId>,
-) {
-    match touched.entry(key) {
-        std::collections::btree_map::Entry::Vacant(entry) => {
-            entry.insert((value, how, what.into_iter().collect()));
-        }
-        std::collections::btree_map::Entry::Occupied(mut entry) => {
-            let (known, before, attributes) = entry.get_mut();
-            *known = value;
-            // Made and changed is made; gone and made again is another.
-            *before = match (*before, how) {
-                (Touch::Created, Touch::Updated | Touch::Replaced) => Touch::Created,
-                (Touch::Deleted, Touch::Created) | (Touch::Replaced, Touch::Updated) => {
-                    Touch::Replaced
-                }
-                (_, later) => later,
-            };
-            if let Some(what) = what
-                && !attributes.contains(&what)
-            {
-                attributes.push(what);
-            }
-        }
-    }
-}
-
 impl<'a> Work<'a> {
     pub(super) fn new(graph: &'a mut Graph, agent: &str, time: Time) -> Result<Self, Refusal> {
         let rights = match &graph.rights {
@@ -127,8 +94,8 @@ impl<'a> Work<'a> {
                 writer,
             },
             schema_changed: false,
-            nodes: BTreeMap::new(),
-            edges: BTreeMap::new(),
+            nodes: Touched::default(),
+            edges: Touched::default(),
             created: Vec::new(),
             rules: Vec::new(),
             rights,
@@ -327,8 +294,12 @@ impl<'a> Work<'a> {
 
     /// Whether the edges of nodes that were given another type still join what they may.
     fn check_retyped(&self) -> Result<(), Refusal> {
+        let is_retyped = |how: Touch| how == Touch::Replaced;
+        if !self.nodes.iter().any(|(_, (_, how, _))| is_retyped(*how)) {
+            return Ok(());
+        }
         let retyped = self.nodes.iter();
-        let retyped = retyped.filter(|(_, (_, how, _))| *how == Touch::Replaced);
+        let retyped = retyped.filter(|(_, (_, how, _))| is_retyped(*how));
         let snapshot = self.snapshot();
         for (id, _) in retyped {
             let Some(node) = snapshot.find_node(*id).map_err(damaged)? else {

@@ -121,6 +121,8 @@ pub struct Graph {
     rights: Option<Rights>,
     /// The clients whose last transactions are known, with the versions that those made.
     clients: BTreeMap<u64, u64>,
+    /// Whether nothing is left to do after the last commit.
+    is_settled: bool,
     leases: Vec<Leased>,
     last_token: u64,
 }
@@ -160,6 +162,7 @@ impl Graph {
             rules: None,
             rights: None,
             clients: BTreeMap::new(),
+            is_settled: true,
             leases: Vec::new(),
             last_token: 0,
         };
@@ -259,7 +262,9 @@ impl Graph {
         agent: &str,
         time: Time,
     ) -> Result<(Commit, Change), Refusal> {
-        self.commit_once(transaction, agent, time, None)
+        let done = self.commit_once(transaction, agent, time, None);
+        self.settle();
+        done
     }
 
     /// Makes what a file says, each attribute with the time and agent that the file gives it, else
@@ -274,11 +279,13 @@ impl Graph {
         time: Time,
     ) -> Result<(Commit, Change), Refusal> {
         let transaction = world.transaction();
-        self.commit_stamped(&transaction, &world.stamps(), agent, time, None)
+        let done = self.commit_stamped(&transaction, &world.stamps(), agent, time, None);
+        self.settle();
+        done
     }
 
     /// As [`Self::commit`], and notes the transaction's id, by which [`Self::answered`] then knows
-    /// it.
+    /// it. What nobody has to wait for is left to [`Self::settle`].
     pub(crate) fn commit_once(
         &mut self,
         transaction: &Transaction,
@@ -321,7 +328,7 @@ impl Graph {
                 if let Some(client) = forgotten {
                     self.clients.remove(&client);
                 }
-                self.reclaim(self.limits.history_bytes);
+                self.is_settled = false;
                 Ok((
                     Commit {
                         version: Version(root.version),
@@ -336,6 +343,15 @@ impl Graph {
                 self.abandon(&before);
                 Err(refusal)
             }
+        }
+    }
+
+    /// Gives up what history is too much after a commit, and gets ready for the next.
+    pub(crate) fn settle(&mut self) {
+        if !self.is_settled {
+            self.is_settled = true;
+            self.reclaim(self.limits.history_bytes);
+            self.writer.allocator.prepare(&self.writer.arena);
         }
     }
 

@@ -91,6 +91,32 @@ impl Writer {
         put
     }
 
+    /// Writes the block of `len` words at `address` again, with another word `at` one place.
+    pub(crate) fn change(
+        &mut self,
+        address: Address,
+        len: usize,
+        at: usize,
+        word: u64,
+    ) -> Result<Address, Full> {
+        if self.allocator.is_fresh(address) {
+            let block = self.arena.block(address, len).unwrap_or(&[]);
+            if let Some(place) = block.get(at) {
+                place.store(word);
+            }
+            return Ok(address);
+        }
+        let new = self.allocator.allocate(&self.arena, len)?;
+        let blocks = (self.arena.block(address, len), self.arena.block(new, len));
+        if let (Some(from), Some(to)) = blocks {
+            for (index, (to, from)) in to.iter().zip(from).enumerate() {
+                to.store(if index == at { word } else { from.load() });
+            }
+        }
+        self.retire(address, len);
+        Ok(new)
+    }
+
     pub(crate) fn retire(&mut self, address: Address, words: usize) {
         if address != 0 {
             self.allocator.retire(address, words);

@@ -83,7 +83,7 @@ pub struct Store {
     server: Server<Ipc, [u8], (), [u8], ()>,
     wake: Listener<Ipc>,
     changes: Publisher<Vec<Change>>,
-    /// Changes that were committed and not sent.
+    /// Changes that were committed since the last was answered.
     unsent: Vec<Change>,
     /// The last request of each client. What was applied the graph itself knows too; this also
     /// knows what was refused.
@@ -234,6 +234,7 @@ impl Store {
         let answer = self.decide(transaction, STORE, time, None);
         self.tell();
         self.ring();
+        self.settle();
         answer
     }
 
@@ -269,15 +270,20 @@ impl Store {
 
     /// Sends what was committed to whoever follows.
     fn tell(&mut self) {
-        let changes = std::mem::take(&mut self.unsent);
-        if changes.is_empty() || !self.changes.has_listeners() {
+        if self.unsent.is_empty() || !self.changes.has_listeners() {
             return;
         }
         self.has_news = true;
-        if let Err(error) = self.changes.send(&changes) {
+        if let Err(error) = self.changes.send(&self.unsent) {
             // The commits stand; who listens sees the gap and reads the snapshot.
-            tracing::warn!("{} changes were not sent: {error}", changes.len());
+            tracing::warn!("{} changes were not sent: {error}", self.unsent.len());
         }
+    }
+
+    /// Does what is left to do after commits were answered: nobody waits for it.
+    fn settle(&mut self) {
+        self.unsent.clear();
+        self.graph.settle();
     }
 
     /// How long the store looks for the next request before it sleeps: longer answers bursts
@@ -349,7 +355,8 @@ impl Store {
         loop {
             let mut served = self.answer_desks();
             self.looks += 1;
-            if self.looks >= LOOKS {
+            // Who shall burn nothing does not look again and again.
+            if self.looks >= LOOKS || self.spin.is_zero() {
                 self.looks = 0;
                 served += self.answer_all()?;
                 let time = now();
@@ -448,6 +455,7 @@ impl Store {
                 }),
                 None => reply(&active, &answered.answers, &mut self.scratch)?,
             }
+            self.settle();
         }
         self.has_news |= served > 0;
         Ok(served)

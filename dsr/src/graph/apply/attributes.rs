@@ -1,7 +1,7 @@
 //! What a commit under way does to attributes. It guarantees that each written one passes the schema and
 //! remembers version, time and writer, and that indices have what the nodes have.
 
-use super::{Work, read, touch};
+use super::{Work, read};
 use crate::arena::Address;
 use crate::arena::table::{AttributeRecord, Place, Stored, Table};
 use crate::interchange::Stamp;
@@ -161,13 +161,8 @@ impl Work<'_> {
                 record.version = self.stamp.record;
                 self.put_node(Some((address, len)), &record)?;
                 let type_id = TypeId(record.type_id);
-                touch(
-                    &mut self.nodes,
-                    NodeId(record.id),
-                    type_id,
-                    Touch::Updated,
-                    Some(name),
-                );
+                self.nodes
+                    .touch(NodeId(record.id), type_id, Touch::Updated, Some(name));
             }
             Owner::Edge(edge) => {
                 let (key, end, mut record) = self.edge(edge)?;
@@ -176,7 +171,7 @@ impl Work<'_> {
                 let name = self.change_row(carrier, &mut record.table, name, value)?;
                 record.version = self.stamp.record;
                 self.put_edge(key, (end, len), &record)?;
-                touch(&mut self.edges, key, (), Touch::Updated, Some(name));
+                self.edges.touch(key, (), Touch::Updated, Some(name));
             }
         }
         Ok(())

@@ -1,7 +1,7 @@
 //! What a commit under way does to edges. It guarantees that both ends of an edge, the edges of its
 //! label and the counts per (label, type, type) agree on which there are.
 
-use super::{Work, read, touch};
+use super::{Work, read};
 use crate::arena::record::{self, EdgeRecord};
 use crate::arena::table::Table;
 use crate::arena::tree;
@@ -74,10 +74,10 @@ impl Work<'_> {
         } else {
             Touch::Created
         };
-        touch(&mut self.edges, key, (), how, None);
+        self.edges.touch(key, (), how, None);
         for (name, value) in attributes {
             let name = self.set_row(Carrier::Edge(label), &mut record.table, name, value)?;
-            touch(&mut self.edges, key, (), Touch::Updated, Some(name));
+            self.edges.touch(key, (), Touch::Updated, Some(name));
         }
         let end = existing.map_or(record::end(to.type_id, 0), |(_, end)| end);
         self.put_edge(key, (end, len), &record)?;
@@ -148,7 +148,7 @@ impl Work<'_> {
         self.root.labels = self.index(directory, key.label.0, [key.from.0, key.to.0], None)?;
         self.root.edge_count -= 1;
         self.count_triple(key.label, [from_type, to.type_id], false)?;
-        touch(&mut self.edges, key, (), Touch::Deleted, None);
+        self.edges.touch(key, (), Touch::Deleted, None);
         Ok(())
     }
 

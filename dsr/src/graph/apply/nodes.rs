@@ -1,7 +1,7 @@
 //! What a commit under way does to nodes. It guarantees that a node, its name, the members of its type
 //! and the edges that touch it never disagree.
 
-use super::{Work, damaged, read, touch};
+use super::{Work, damaged, read};
 use crate::arena::record::{self, NodeRecord};
 use crate::arena::table::Table;
 use crate::arena::{Address, cells, tree, trie};
@@ -87,12 +87,12 @@ impl Work<'_> {
             into: 0,
             table: Table::default(),
         };
-        touch(&mut self.nodes, id, type_id, Touch::Created, None);
+        self.nodes.touch(id, type_id, Touch::Created, None);
         for (name, value) in attributes {
             let before = self.indexed_place(&node.table, name)?;
             let name = self.set_row(Carrier::Node(type_id), &mut node.table, name, value)?;
             self.index_value(name, id, before, value.place())?;
-            touch(&mut self.nodes, id, type_id, Touch::Updated, Some(name));
+            self.nodes.touch(id, type_id, Touch::Updated, Some(name));
         }
         let blob = record::write_blob(&mut self.graph.writer, name.as_bytes());
         node.name = self.room(blob)?;
@@ -179,13 +179,8 @@ impl Work<'_> {
         self.root.names = self.room(names)?;
         self.index_type(TypeId(node.type_id), id, false)?;
         self.root.node_count -= 1;
-        touch(
-            &mut self.nodes,
-            id,
-            TypeId(node.type_id),
-            Touch::Deleted,
-            None,
-        );
+        self.nodes
+            .touch(id, TypeId(node.type_id), Touch::Deleted, None);
         Ok(())
     }
 
@@ -208,7 +203,7 @@ impl Work<'_> {
         node.type_id = type_id.0;
         node.version = self.stamp.record;
         self.put_node(Some((address, len)), &node)?;
-        touch(&mut self.nodes, id, type_id, Touch::Replaced, None);
+        self.nodes.touch(id, type_id, Touch::Replaced, None);
         Ok(())
     }
 

@@ -78,9 +78,12 @@ impl Store {
         let alone = request.transactions.len() == 1;
         let id = alone.then_some(TransactionId { client, sequence });
         let transactions = request.transactions.iter();
-        transactions
-            .map(|transaction| self.decide(transaction, &request.agent, request.time, id))
-            .collect()
+        let decide = |transaction| {
+            // What the one before left to do; what the last leaves waits for the answer.
+            self.graph.settle();
+            self.decide(transaction, &request.agent, request.time, id)
+        };
+        transactions.map(decide).collect()
     }
 
     /// Whether the one who asks may go by that name.

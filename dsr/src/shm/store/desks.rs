@@ -160,6 +160,9 @@ impl Store {
             Laid::Answered(length) => desk::answer(slot, sequence, bytes.get(..length)),
         }
         self.has_news |= desk::is_asleep(desk::request_of(desk.page.words()));
+        desk.request.transactions.clear();
+        self.ring();
+        self.settle();
         true
     }
 
