@@ -3,144 +3,97 @@
 use super::{Address, trie};
 use crate::Time;
 
-/// Words of a root.
-pub(crate) const ROOT_WORDS: usize = 20;
+/// What a word of a root holds.
+trait Bits {
+    fn to_bits(self) -> u64;
+    fn from_bits(bits: u64) -> Self;
+}
 
-/// One version of the graph: where its structures begin.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Root {
-    pub(crate) version: u64,
-    pub(crate) time: i64,
-    /// Link to the trie from node id to node record.
-    pub(crate) nodes: trie::Link,
-    /// Tree from (hash of name, node id) to node record.
-    pub(crate) names: Address,
-    /// Directory by type: tree of node ids, count.
-    pub(crate) types: Address,
-    /// Directory by label: tree of (from, to), count.
-    pub(crate) labels: Address,
-    /// Blob: the schema, and how often it changed.
-    pub(crate) schema: Address,
-    pub(crate) schema_version: u64,
-    /// Blob: the names of the agents that have written.
-    pub(crate) writers: Address,
-    pub(crate) node_count: u64,
-    pub(crate) edge_count: u64,
-    pub(crate) next_id: u64,
-    /// Tree from (label, type of source, type of target) to how many edges are such.
-    pub(crate) triples: Address,
-    /// Directory by attribute with an index: tree of (value's place in the order, node id), count.
-    pub(crate) values: Address,
-    /// The agent that made the version: 1 more than its number among the writers, 0 for none.
-    pub(crate) agent: u64,
-    /// Blob: the rules that were applied; 0 for none.
-    pub(crate) rules: Address,
-    /// Tree from (client, 0) to the client's last transaction.
-    pub(crate) answers: Address,
-    /// The epoch of the first store of this graph.
-    pub(crate) lineage: u64,
-    /// The row of cells, and how many they are.
-    pub(crate) cells: Address,
-    pub(crate) cell_count: u64,
+impl Bits for u64 {
+    fn to_bits(self) -> u64 {
+        self
+    }
+
+    fn from_bits(bits: u64) -> Self {
+        bits
+    }
+}
+
+impl Bits for i64 {
+    fn to_bits(self) -> u64 {
+        self.cast_unsigned()
+    }
+
+    fn from_bits(bits: u64) -> Self {
+        bits.cast_signed()
+    }
+}
+
+/// Defines a root and its words, which are its fields in their order.
+macro_rules! root {
+    ($(#[$of_root:meta])* { $($(#[$of_field:meta])* $field:ident: $kind:ty,)* }) => {
+        $(#[$of_root])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+        pub(crate) struct Root {
+            $($(#[$of_field])* pub(crate) $field: $kind,)*
+        }
+
+        /// Words of a root.
+        pub(crate) const ROOT_WORDS: usize = [$(stringify!($field)),*].len();
+
+        impl Root {
+            pub(super) fn to_words(self) -> [u64; ROOT_WORDS] {
+                [$(Bits::to_bits(self.$field)),*]
+            }
+
+            pub(super) fn from_words(words: [u64; ROOT_WORDS]) -> Self {
+                let [$($field),*] = words;
+                Self { $($field: Bits::from_bits($field)),* }
+            }
+        }
+    };
+}
+
+root! {
+    /// One version of the graph: where its structures begin.
+    {
+        version: u64,
+        time: i64,
+        /// Link to the trie from node id to node record.
+        nodes: trie::Link,
+        /// Tree from (hash of name, node id) to node record.
+        names: Address,
+        /// Directory by type: tree of node ids, count.
+        types: Address,
+        /// Directory by label: tree of (from, to), count.
+        labels: Address,
+        /// Blob: the schema, and how often it changed.
+        schema: Address,
+        schema_version: u64,
+        /// Blob: the names of the agents that have written.
+        writers: Address,
+        node_count: u64,
+        edge_count: u64,
+        next_id: u64,
+        /// Tree from (label, type of source, type of target) to how many edges are such.
+        triples: Address,
+        /// Directory by attribute with an index: tree of (value's place in the order, node id), count.
+        values: Address,
+        /// The agent that made the version: 1 more than its number among the writers, 0 for none.
+        agent: u64,
+        /// Blob: the rules that were applied; 0 for none.
+        rules: Address,
+        /// Tree from (client, 0) to the client's last transaction.
+        answers: Address,
+        /// The epoch of the first store of this graph.
+        lineage: u64,
+        /// The row of cells, and how many they are.
+        cells: Address,
+        cell_count: u64,
+    }
 }
 
 impl Root {
-    pub(super) fn to_words(self) -> [u64; ROOT_WORDS] {
-        let Self {
-            version,
-            time,
-            nodes,
-            names,
-            types,
-            labels,
-            schema,
-            schema_version,
-            writers,
-            node_count,
-            edge_count,
-            next_id,
-            triples,
-            values,
-            agent,
-            rules,
-            answers,
-            lineage,
-            cells,
-            cell_count,
-        } = self;
-        let time = time.cast_unsigned();
-        [
-            version,
-            time,
-            nodes,
-            names,
-            types,
-            labels,
-            schema,
-            schema_version,
-            writers,
-            node_count,
-            edge_count,
-            next_id,
-            triples,
-            values,
-            agent,
-            rules,
-            answers,
-            lineage,
-            cells,
-            cell_count,
-        ]
-    }
-
-    pub(super) fn from_words(words: [u64; ROOT_WORDS]) -> Self {
-        let [
-            version,
-            time,
-            nodes,
-            names,
-            types,
-            labels,
-            schema,
-            schema_version,
-            writers,
-            node_count,
-            edge_count,
-            next_id,
-            triples,
-            values,
-            agent,
-            rules,
-            answers,
-            lineage,
-            cells,
-            cell_count,
-        ] = words;
-        let time = time.cast_signed();
-        Self {
-            version,
-            time,
-            nodes,
-            names,
-            types,
-            labels,
-            schema,
-            schema_version,
-            writers,
-            node_count,
-            edge_count,
-            next_id,
-            triples,
-            values,
-            agent,
-            rules,
-            answers,
-            lineage,
-            cells,
-            cell_count,
-        }
-    }
-
     pub(crate) fn time(&self) -> Time {
         Time::from_nanoseconds(self.time)
     }
