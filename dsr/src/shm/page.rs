@@ -13,11 +13,14 @@ use iceoryx2::port::subscriber::Subscriber as IpcSubscriber;
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{Alignment, AllocationStrategy, BackpressureStrategy};
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// How often an owner looks for processes that joined.
 const NEWCOMERS: Duration = Duration::from_millis(10);
+/// Pages that a process may hold at once: those of owners that have died take places of which iceoryx2 has
+/// as many, and it would end a process that took more.
+const MAX_HELD: usize = MAX_PROCESSES + 8;
 /// Pages begin where a cache line does.
 pub(super) const LINE: Alignment = Alignment::ALIGN_64;
 
@@ -33,7 +36,7 @@ fn service(node: &IpcNode, name: &str) -> Result<Factory, InstanceError> {
         .max_nodes(MAX_PROCESSES)
         .history_size(1)
         .subscriber_max_buffer_size(1)
-        .subscriber_max_borrowed_samples(2 * MAX_PROCESSES)
+        .subscriber_max_borrowed_samples(MAX_HELD)
         .enable_safe_overflow(true);
     one_at_a_time(node, || builder.clone().open_or_create())
         .map_err(|e| ipc(&format!("pages `{name}`"), e))
@@ -118,6 +121,7 @@ impl OwnPage {
 pub(super) struct Pages {
     subscriber: IpcSubscriber<Ipc, [Word], ()>,
     name: String,
+    held: Arc<()>,
 }
 
 impl Pages {
@@ -126,18 +130,28 @@ impl Pages {
         let subscriber = port(node, || service.subscriber_builder().create())
             .map_err(|e| ipc(&format!("pages `{name}`"), e))?;
         let name = name.to_owned();
-        Ok(Self { subscriber, name })
+        let held = Arc::default();
+        Ok(Self {
+            subscriber,
+            name,
+            held,
+        })
     }
 
-    /// The next page that has arrived.
+    /// The next page that has arrived; none before one is dropped where as many are held as can be.
     pub(super) fn receive(&self) -> Result<Option<Segment>, InstanceError> {
+        // One is this.
+        if Arc::strong_count(&self.held) > MAX_HELD {
+            return Ok(None);
+        }
         let sample = self.subscriber.receive();
         let sample = sample.map_err(|e| ipc(&format!("pages `{}`", self.name), e))?;
+        let held = Arc::clone(&self.held);
         Ok(sample.map(|sample| {
             let (start, len) = (sample.payload().as_ptr(), sample.payload().len());
             // SAFETY: the payload is `len` atomics in shared memory that stays mapped while the
             // sample lives, and moving the sample does not move it.
-            unsafe { Segment::in_shared_memory(start, len, Box::new(sample)) }
+            unsafe { Segment::in_shared_memory(start, len, Box::new((sample, held))) }
         }))
     }
 }

@@ -15,7 +15,7 @@ pub use commit::CommitError;
 pub(super) use commit::{ANSWERS, Request, requests};
 pub(super) use desk::DESKS;
 
-use commit::{ASKED, SPIN};
+use commit::{Client, SPIN};
 use desk::Desk;
 
 use super::arena::ArenaSubscriber;
@@ -30,10 +30,8 @@ use super::{
 };
 use crate::arena::{Arena, Root, record};
 use crate::{Epoch, Filter, ReadError, Schema, Snapshot};
-use iceoryx2::port::client::Client;
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
-use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
 use iceoryx2::service::port_factory::event as event_factory;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -95,7 +93,8 @@ pub struct Session {
     agent: String,
     arena: ArenaSubscriber,
     schema: Option<(Epoch, u64, Arc<Schema>)>,
-    client: Client<Ipc, [u8], (), [u8], ()>,
+    /// For requests by message, once there was one.
+    client: Option<Client>,
     wake_store: Notifier<Ipc>,
     clock: Option<(Listener<Ipc>, Subscriber<Tick>)>,
     /// When it last looked for memory that it does not have: of another store, of owners of hot
@@ -111,7 +110,7 @@ pub struct Session {
     own_streams: OwnStreams,
     readers: Readers,
     tenant: Option<Arc<Tenant>>,
-    /// Where this session's requests lie, once it has made two.
+    /// Where this session's requests lie, once there was one.
     desk: Option<Desk>,
     /// An epoch, and the first life of the store that its graph goes back to.
     lineage: Option<(Epoch, u64)>,
@@ -133,18 +132,6 @@ impl Session {
         instance.create_folder()?;
         let node = instance.join()?;
         let arena = ArenaSubscriber::open(&node)?;
-        let requests = requests(&node)?;
-        let make = || {
-            requests
-                .client_builder()
-                .initial_max_slice_len(4096)
-                .allocation_strategy(AllocationStrategy::PowerOfTwo)
-                .backpressure_strategy(BackpressureStrategy::DiscardData)
-                // The store may still read one that was sent again.
-                .override_request_preallocation(|worst| worst.min(2 * ASKED))
-                .create()
-        };
-        let client = port(&node, make).map_err(|e| ipc("the store's client", e))?;
         let bell = event(&node, REQUESTS_EVENT)?;
         let wake_store = port(&node, || bell.notifier_builder().create())
             .map_err(|e| ipc("the store's bell", e))?;
@@ -153,7 +140,7 @@ impl Session {
             agent: agent.to_owned(),
             arena,
             schema: None,
-            client,
+            client: None,
             wake_store,
             clock: None,
             looked: None,

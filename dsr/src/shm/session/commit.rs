@@ -2,11 +2,13 @@
 //! come of them. It guarantees that a request which got lost is sent again, and applied once.
 
 use super::super::{
-    InstanceError, Ipc, IpcNode, MAX_PROCESSES, bell, ipc, now, one_at_a_time, service_name,
+    InstanceError, Ipc, IpcNode, MAX_PROCESSES, bell, ipc, now, one_at_a_time, port, service_name,
 };
 use super::{AttachError, PATIENCE, Session, ring};
 use crate::arena::Arena;
 use crate::{Commit, Durability, Epoch, Refusal, Time, Transaction, Version};
+use iceoryx2::port::client;
+use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
 use iceoryx2::service::port_factory::request_response;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -59,6 +61,8 @@ pub(super) struct Aim {
     lineage: u64,
 }
 
+/// The asking end of it.
+pub(super) type Client = client::Client<Ipc, [u8], (), [u8], ()>;
 /// Requests and answers are bytes: see [`Request`].
 type RequestFactory = request_response::PortFactory<Ipc, [u8], (), [u8], ()>;
 
@@ -160,6 +164,29 @@ impl Session {
         })
     }
 
+    /// The port for requests by message. Its tables are a third of the memory that a session has for
+    /// itself, and most never need it: it is opened for the first message.
+    fn client(&mut self) -> Result<&Client, InstanceError> {
+        let client = match self.client.take() {
+            Some(client) => client,
+            None => {
+                let requests = requests(&self.node)?;
+                let make = || {
+                    requests
+                        .client_builder()
+                        .initial_max_slice_len(4096)
+                        .allocation_strategy(AllocationStrategy::PowerOfTwo)
+                        .backpressure_strategy(BackpressureStrategy::DiscardData)
+                        // The store may still read one that was sent again.
+                        .override_request_preallocation(|worst| worst.min(2 * ASKED))
+                        .create()
+                };
+                port(&self.node, make).map_err(|e| ipc("the store's client", e))?
+            }
+        };
+        Ok(self.client.insert(client))
+    }
+
     /// Asks by a message, under the number of the last request.
     fn ask_by_message(
         &mut self,
@@ -207,7 +234,7 @@ impl Session {
                 }
                 (aim.epoch, aim.arena) = (epoch, arena);
             }
-            let loan = self.client.loan_slice_uninit(request.len());
+            let loan = self.client()?.loan_slice_uninit(request.len());
             let loan = loan.map_err(|e| ipc("sending a request", e))?;
             let pending = loan.write_from_slice(request).send();
             let pending = pending.map_err(|e| ipc("sending a request", e))?;

@@ -6,13 +6,18 @@ use super::{CommitError, Session, ring};
 use crate::arena::{Arena, Word};
 use crate::desk::{self, Answered, DESK_WORDS, Owner, SLOTS};
 use crate::shm::page::OwnPage;
-use crate::shm::{IpcNode, bell, ipc, now};
+use crate::shm::{IpcNode, bell, ipc, now, pause};
 use crate::{Commit, Durability, Epoch, Refusal, Time, Transaction};
 use std::time::{Duration, Instant};
 
 pub(in crate::shm) const DESKS: &str = "graph/desks";
 /// How often a session without a slot looks for one.
 const LOOK: Duration = Duration::from_millis(10);
+/// How long a new desk may take until the store has seen it, which looks every millisecond, before its owner
+/// asks by a message.
+const ARRIVAL: Duration = Duration::from_millis(20);
+/// How often its owner looks whether it has.
+const NAP: Duration = Duration::from_micros(100);
 /// How many looks for an answer go by between two at the clock.
 const ROUNDS: u32 = 64;
 
@@ -53,13 +58,9 @@ impl Desk {
 
     /// Where the store answers, once it has seen the desk.
     fn slot(&mut self, epoch: Epoch, arena: &Arena) -> Option<usize> {
-        let is_mine = |slot: usize| {
-            let words = arena.slot(slot);
-            words.is_some_and(|words| desk::is_of(words, self.client))
-        };
         if let Some((of, slot)) = self.slot
             && of == epoch
-            && is_mine(slot)
+            && is_of(arena, slot, self.client)
         {
             return Some(slot);
         }
@@ -69,10 +70,32 @@ impl Desk {
         }
         self.look_at = time + LOOK;
         self.page.as_ref()?.serve_newcomers();
-        let slot = (0..SLOTS).find(|&slot| is_mine(slot));
+        self.find_slot(epoch, arena)
+    }
+
+    fn find_slot(&mut self, epoch: Epoch, arena: &Arena) -> Option<usize> {
+        let is_mine = |slot: &usize| is_of(arena, *slot, self.client);
+        let slot = (0..SLOTS).find(is_mine);
         self.slot = slot.map(|slot| (epoch, slot));
         slot
     }
+
+    /// Waits until the store has seen the new desk.
+    fn arrive(&mut self, aim: &Aim) {
+        let deadline = now() + ARRIVAL;
+        while self.page.is_some()
+            && self.find_slot(aim.epoch, &aim.arena).is_none()
+            && now() < deadline
+        {
+            pause(NAP);
+        }
+    }
+}
+
+/// Whether a slot is that client's.
+fn is_of(arena: &Arena, slot: usize, client: u64) -> bool {
+    let words = arena.slot(slot);
+    words.is_some_and(|words| desk::is_of(words, client))
 }
 
 impl Drop for Desk {
@@ -97,8 +120,7 @@ impl Session {
         transaction: &Transaction,
         time: Time,
     ) -> Result<Option<Result<Commit, Refusal>>, CommitError> {
-        // Who asks only once is answered before a desk were made.
-        if transaction.durability == Durability::OnDisk || self.sequence == 1 {
+        if transaction.durability == Durability::OnDisk {
             return Ok(None);
         }
         let (client, sequence) = (self.id, self.sequence);
@@ -108,7 +130,10 @@ impl Session {
                 process: std::process::id(),
                 agent: self.agent.clone(),
             };
-            Desk::open(&self.node, &owner)
+            let mut desk = Desk::open(&self.node, &owner);
+            ring(&self.wake_store);
+            desk.arrive(aim);
+            desk
         });
         let Some(slot) = desk.slot(aim.epoch, &aim.arena) else {
             return Ok(None);
