@@ -156,6 +156,13 @@ impl Snapshot {
         Version(self.root.version)
     }
 
+    /// Whether this store has committed nothing since: one load from the shared memory, for who looks again and
+    /// again. Of a store that was restarted only [`Session::snapshot`](crate::Session::snapshot) knows.
+    #[inline]
+    pub fn is_newest(&self) -> bool {
+        self.arena.head() <= self.root.version
+    }
+
     /// When that version was committed.
     pub fn time(&self) -> Time {
         self.root.time()

@@ -53,6 +53,7 @@ pub(super) fn polling(
     let bare = BareClient::open(hall.instance()).map_err(Failure::internal)?;
     let mut session = hall.session("committer")?;
     session.set_spin(PATIENCE);
+    let all = peer::sit(0)?;
     let (mut ours, mut raw) = (Vec::new(), Vec::new());
     for turn in 0..effort.turns {
         bare.wake().map_err(Failure::internal)?;
@@ -65,6 +66,7 @@ pub(super) fn polling(
         })?;
     }
     drop(bare);
+    peer::stand(&all)?;
     echo.end()?;
     let raw = median(&mut raw) / 1e3;
     figures.push(Figure {
@@ -87,19 +89,20 @@ pub(super) fn visible(
     let mut writer = hall.ready("stamp", &[effort.stamps])?;
     let mut session = hall.session("seer")?;
     let mut samples = Vec::new();
-    let mut version = session.snapshot().map_err(Failure::internal)?.version();
+    let mut snapshot = session.snapshot().map_err(Failure::internal)?;
+    let all = peer::sit(0)?;
     writer.go()?;
     let deadline = Instant::now() + PATIENCE;
     let mut last = 0;
     while last < effort.stamps {
-        let snapshot = session.snapshot().map_err(Failure::internal)?;
-        if snapshot.version() == version {
-            if Instant::now() > deadline {
-                return Err(Failure::internal("the stamps stopped coming"));
-            }
+        if Instant::now() > deadline {
+            return Err(Failure::internal("the stamps stopped coming"));
+        }
+        let mut looks = 0..1000;
+        if looks.all(|_| snapshot.is_newest()) {
             continue;
         }
-        version = snapshot.version();
+        snapshot = session.snapshot().map_err(Failure::internal)?;
         let read = peer::read_stamp(&snapshot).map_err(Failure::internal)?;
         let seen = peer::clock();
         if let Some((number, stamp)) = read
@@ -109,6 +112,7 @@ pub(super) fn visible(
             samples.push(seen.saturating_sub(stamp));
         }
     }
+    peer::stand(&all)?;
     writer.end()?;
     figures.push(Figure {
         name: "visible_poll",

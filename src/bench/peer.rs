@@ -73,9 +73,9 @@ pub(super) fn clock() -> u64 {
 }
 
 /// Keeps the calling thread on one of the processors that it may use; all of those. Where the kernel
-/// puts processes that wake each other decides over the time that it takes more than anything that they
-/// do; so those that are compared sit alike, each beside the one that it wakes, not on the same
-/// processor.
+/// puts processes decides over the time between them more than anything that they do: some processors are
+/// nearer to each other than others, and one may have to be woken. So those that are compared sit alike, each
+/// on a processor of its own.
 pub(super) fn sit(place: usize) -> Result<CpuSet, Failure> {
     let all = sched_getaffinity(None).map_err(Failure::internal)?;
     let mut usable = (0..CpuSet::MAX_CPU).filter(|&processor| all.is_set(processor));
@@ -137,9 +137,7 @@ fn store(
         committed.map_err(Failure::internal)?;
     }
     store.set_spin(spin);
-    if spin.is_zero() {
-        sit(1)?;
-    }
+    sit(1)?;
     let ended = end_of_input();
     say("ready")?;
     while !ended.load(Ordering::Acquire) {
@@ -151,9 +149,7 @@ fn store(
 
 fn bare(instance: &Instance, spin: Duration) -> Result<(), Failure> {
     let server = BareServer::open(instance).map_err(Failure::internal)?;
-    if spin.is_zero() {
-        sit(1)?;
-    }
+    sit(1)?;
     let ended = end_of_input();
     say("ready")?;
     while !ended.load(Ordering::Acquire) {
@@ -167,6 +163,7 @@ fn bare(instance: &Instance, spin: Duration) -> Result<(), Failure> {
 fn stamp(instance: &Instance, times: u64) -> Result<(), Failure> {
     let mut session = attach(instance, "stamper")?;
     session.set_spin(PATIENCE);
+    sit(2)?;
     say("ready")?;
     std::io::stdin()
         .read_exact(&mut [0; 3])

@@ -462,3 +462,15 @@ fn what_the_schema_does_not_have_is_refused_whole_and_told_with_the_right_name()
     );
     refused(&|t| t.delete_node("hall"), "there is no `hall`");
 }
+
+#[test]
+fn a_snapshot_is_the_newest_until_the_next_commit() {
+    let mut graph = Graph::in_memory(Schema::open());
+    graph.announce();
+    let snapshot = graph.snapshot();
+    assert!(snapshot.is_newest());
+    let node = Transaction::new();
+    graph.commit(&node, "a", Time::default()).unwrap();
+    assert!(!snapshot.is_newest());
+    assert!(graph.snapshot().is_newest());
+}
