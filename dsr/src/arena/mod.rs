@@ -79,7 +79,7 @@ pub enum ReadError {
 }
 
 pub(crate) const MAGIC: u64 = u64::from_le_bytes(*b"cortexG1");
-pub(crate) const FORMAT: u64 = 6;
+pub(crate) const FORMAT: u64 = 7;
 
 /// Header words of segment 0.
 mod at {
@@ -90,7 +90,8 @@ mod at {
     pub(super) const OLDEST: usize = 4;
     pub(super) const SEGMENTS: usize = 5;
     pub(super) const BELL: usize = 6;
-    pub(super) const ASLEEP: usize = 7;
+    /// On another cache line than the head: who asks reads it, and shall not slow the next commit.
+    pub(super) const ASLEEP: usize = 8;
     pub(super) const LEASES: usize = 16;
     pub(super) const SLOTS: usize = 64;
     pub(super) const ROOTS: usize = SLOTS + super::SLOTS * super::SLOT_WORDS;
@@ -294,6 +295,13 @@ impl Arena {
     pub(crate) fn publish(&self, root: &Root) {
         if let Some(ring) = self.ring() {
             ring.publish(root.to_words());
+        }
+    }
+
+    /// Brings the place of the next version's root into the processor's cache.
+    pub(crate) fn prepare_root(&self, version: u64) {
+        if let Some(ring) = self.ring() {
+            ring.prepare(version);
         }
     }
 

@@ -91,6 +91,14 @@ impl<W: Atomic, const N: usize> Ring<'_, W, N> {
         Some((root, head, head.wrapping_sub(version) < self.kept()))
     }
 
+    /// Writes what is there where the root of `version` will be, which takes the words from other processors'
+    /// caches before anybody waits for it.
+    pub(super) fn prepare(&self, version: u64) {
+        for word in self.slot(version).into_iter().flatten() {
+            word.store(word.load(Ordering::Relaxed), Ordering::Relaxed);
+        }
+    }
+
     /// Makes `root` the newest version: one release store, before which nobody sees any of it.
     pub(super) fn publish(&self, root: [u64; N]) {
         let Some(slot) = self.slot(root[0]) else {

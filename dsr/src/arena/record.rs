@@ -13,12 +13,14 @@
 //! - Directory: length, then (tree, count) per id.
 
 use super::allocator::Full;
-use super::table::{Load, Table};
+use super::table::{self, Load, Table};
 use super::tree::Key;
 use super::{Address, Arena, Word};
 use crate::graph::Writer;
 
 pub(crate) const NODE_HEADER: usize = 7;
+/// The word of a node's header that says which version changed the node last.
+pub(crate) const VERSION: usize = 3;
 /// The word of a node's header that says since which version the record is the node's.
 pub(crate) const SINCE: usize = 6;
 pub(crate) const EDGE_HEADER: usize = 4;
@@ -105,6 +107,30 @@ impl NodeRecord {
     /// The words that it takes.
     pub(crate) fn len(&self) -> usize {
         NODE_HEADER + self.table.words().len()
+    }
+}
+
+/// A node's record, left where it lies.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct NodeInPlace {
+    pub(crate) id: u64,
+    pub(crate) type_id: u16,
+    /// The words that it takes.
+    pub(crate) len: usize,
+}
+
+impl NodeInPlace {
+    /// The node at the beginning of `words`, and where in them its small attribute of that name lies.
+    pub(crate) fn with_small(words: &[Word], name: u16) -> Option<(Self, std::ops::Range<usize>)> {
+        let (header, table) = words.split_first_chunk::<NODE_HEADER>()?;
+        let kind = header[1].load();
+        let node = Self {
+            id: header[0].load(),
+            type_id: kind as u16,
+            len: NODE_HEADER + (kind >> 32) as usize,
+        };
+        let small = table::small_of(table, kind, name)?;
+        Some((node, NODE_HEADER + small.start..NODE_HEADER + small.end))
     }
 }
 

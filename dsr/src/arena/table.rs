@@ -81,6 +81,19 @@ pub(crate) fn count(kind: u64) -> usize {
     usize::from((kind >> 16) as u16)
 }
 
+/// Where in the table at the beginning of `words` the attribute of that name lies, if it lies there.
+pub(super) fn small_of(words: &[Word], kind: u64, name: u16) -> Option<std::ops::Range<usize>> {
+    let words = words.get(..(kind >> 32) as usize)?;
+    let mut rows = words.get(..count(kind))?.iter().map(Word::load);
+    match place_of(rows.find(|&row| name_of(row) == name)?) {
+        Place::At(_) => None,
+        Place::InTable(offset) => {
+            let end = offset + attribute_words(words.get(offset)?.load());
+            (end <= words.len()).then_some(offset..end)
+        }
+    }
+}
+
 /// A table on its way to being written again.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Table {

@@ -238,13 +238,13 @@ pub(crate) fn insert(
     writer.write(&encode(true, &[(left_key, left), (right_key, right)]))
 }
 
-/// Sets what `key` leads to, if it leads to something already; the new root.
+/// Sets what `key` leads to, if it leads to something already; the new root, and what that was.
 pub(crate) fn set(
     writer: &mut Writer,
     root: Address,
     key: Key,
     word: u64,
-) -> Result<Option<Address>, Full> {
+) -> Result<Option<(Address, u64)>, Full> {
     if root == 0 {
         return Ok(None);
     }
@@ -260,13 +260,14 @@ pub(crate) fn set(
     let below = (index < block.len()).then(|| (block.key(index), block.word(index)));
     let new = match below {
         Some((_, child)) if inner => set(writer, child, key, word)?,
-        Some((found, _)) if found == key => Some(word),
+        Some((found, before)) if found == key => Some((word, before)),
         _ => None,
     };
-    let Some(new) = new else {
+    let Some((new, before)) = new else {
         return Ok(None);
     };
-    writer.change(root, len, words_of(index) + 2, new).map(Some)
+    let root = writer.change(root, len, words_of(index) + 2, new)?;
+    Ok(Some((root, before)))
 }
 
 type Split = Option<(Key, Address)>;

@@ -43,18 +43,18 @@ pub(crate) struct Answered {
     pub(crate) commit: Commit,
 }
 
-impl Answered {
-    fn encode(&self, words: &mut Vec<u64>) {
-        let commit = &self.commit;
-        words.extend([
-            self.id.sequence,
-            commit.version.0,
-            commit.time.nanoseconds().cast_unsigned(),
-            commit.created.len() as u64,
-        ]);
-        words.extend(commit.created.iter().map(|id| id.0));
-    }
+/// Appends the words of a record.
+fn encode(id: TransactionId, commit: &Commit, words: &mut Vec<u64>) {
+    words.extend([
+        id.sequence,
+        commit.version.0,
+        commit.time.nanoseconds().cast_unsigned(),
+        commit.created.len() as u64,
+    ]);
+    words.extend(commit.created.iter().map(|id| id.0));
+}
 
+impl Answered {
     /// The words of the record at `address`.
     fn len(arena: &Arena, address: Address) -> Result<usize, Address> {
         let count = arena.from(address).and_then(|words| words.get(HEAD - 1));
@@ -109,8 +109,8 @@ impl Snapshot {
 
 impl Work<'_> {
     /// Notes what this commit answers.
-    pub(super) fn remember(&mut self, answered: &Answered) -> Result<(), Refusal> {
-        let client = answered.id.client;
+    pub(super) fn remember(&mut self, id: TransactionId, commit: &Commit) -> Result<(), Refusal> {
+        let client = id.client;
         let known = &self.graph.clients;
         if known.len() >= CLIENTS && !known.contains_key(&client) {
             let oldest = known.iter().min_by_key(|(_, version)| **version);
@@ -122,16 +122,20 @@ impl Work<'_> {
                 self.forgotten = Some(oldest);
             }
         }
-        self.forget(client)?;
-        let put = self.graph.writer.put(None, |words| answered.encode(words));
+        let put = self
+            .graph
+            .writer
+            .put(None, |words| encode(id, commit, words));
         let address = self.room(put)?;
         let (root, key) = (self.root.answers, [client, 0]);
-        let writer = &mut self.graph.writer;
-        let answers = match tree::set(writer, root, key, address) {
-            Ok(None) => tree::insert(writer, root, key, address),
-            known => known.map(Option::unwrap_or_default),
+        let set = tree::set(&mut self.graph.writer, root, key, address);
+        self.root.answers = if let Some((answers, last)) = self.room(set)? {
+            self.give_up(last)?;
+            answers
+        } else {
+            let answers = tree::insert(&mut self.graph.writer, root, key, address);
+            self.room(answers)?
         };
-        self.root.answers = self.room(answers)?;
         Ok(())
     }
 
@@ -139,10 +143,12 @@ impl Work<'_> {
     fn forget(&mut self, client: u64) -> Result<(), Refusal> {
         let arena = &self.graph.writer.arena;
         let found = read(tree::find(arena, self.root.answers, [client, 0]))?;
-        if let Some(address) = found {
-            let words = read(Answered::len(arena, address))?;
-            self.graph.writer.retire(address, words);
-        }
+        found.map_or(Ok(()), |address| self.give_up(address))
+    }
+
+    fn give_up(&mut self, address: Address) -> Result<(), Refusal> {
+        let words = read(Answered::len(&self.graph.writer.arena, address))?;
+        self.graph.writer.retire(address, words);
         Ok(())
     }
 }
@@ -170,7 +176,7 @@ mod tests {
     fn commit(graph: &mut Graph, id: TransactionId, transaction: &Transaction) -> Commit {
         let done = graph.commit_once(transaction, "agent", Time::default(), Some(id));
         graph.settle();
-        done.unwrap().0
+        done.unwrap()
     }
 
     #[test]

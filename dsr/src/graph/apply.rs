@@ -8,18 +8,18 @@ mod nodes;
 mod touched;
 
 use super::image::{AttributeImage, Image};
-use super::{Answered, Graph, TransactionId};
+use super::{Graph, TransactionId};
 use crate::arena::allocator::Full;
 use crate::arena::record;
 use crate::arena::{Address, Root};
 use crate::rights::AgentRights;
 use crate::{
-    AttributeId, AttributeType, Change, Commit, EdgeChange, EdgeKey, EdgeRef, LabelId, NodeChange,
-    NodeId, NodeRef, Operation, Owner, Precondition, ReadError, Refusal, RuleApplication, Schema,
-    SchemaError, Snapshot, Time, Touch, TypeId, Value, Version,
+    AttributeId, AttributeType, Commit, EdgeRef, LabelId, NodeId, NodeRef, Operation, Owner,
+    Precondition, ReadError, Refusal, RuleApplication, Schema, SchemaError, Snapshot, Time, Touch,
+    TypeId, Value, Version,
 };
 use std::sync::Arc;
-use touched::Touched;
+pub(super) use touched::Effects;
 
 /// The name that the store itself commits under, which no agent may use.
 pub(crate) const STORE: &str = "store";
@@ -41,22 +41,15 @@ struct Stamp {
     writer: u16,
 }
 
-/// The root that a commit made, the nodes that it created, what it changed, and the client whose
-/// last transaction was forgotten for it.
-pub(super) type Applied = (Root, Vec<NodeId>, Change, Option<u64>);
-
+/// A commit under way.
 pub(super) struct Work<'a> {
     pub(super) graph: &'a mut Graph,
     pub(super) root: Root,
     /// The client whose last transaction this commit forgets.
     pub(super) forgotten: Option<u64>,
-    agent: String,
     stamp: Stamp,
     schema_changed: bool,
-    nodes: Touched<NodeId, TypeId>,
-    edges: Touched<EdgeKey, ()>,
     created: Vec<NodeId>,
-    rules: Vec<RuleApplication>,
     /// What the agent may do; `None` where it may do everything.
     rights: Option<Arc<AgentRights>>,
     /// The operations are a rule's, which the agent may apply whatever it does.
@@ -72,6 +65,7 @@ impl<'a> Work<'a> {
         let mut root = graph.root;
         root.version += 1;
         root.time = time.nanoseconds();
+        graph.effects.clear();
         let writer = graph
             .writer_id(agent, &mut root)
             .map_err(|Full| graph.full())?;
@@ -86,7 +80,6 @@ impl<'a> Work<'a> {
             graph,
             root,
             forgotten: None,
-            agent: agent.to_owned(),
             stamp: Stamp {
                 record: root.version,
                 version: root.version,
@@ -94,10 +87,7 @@ impl<'a> Work<'a> {
                 writer,
             },
             schema_changed: false,
-            nodes: Touched::default(),
-            edges: Touched::default(),
             created: Vec::new(),
-            rules: Vec::new(),
             rights,
             by_rule: false,
         })
@@ -129,7 +119,7 @@ impl<'a> Work<'a> {
         let writers = work.graph.write_writers(writers, &mut work.root);
         work.room(writers)?;
         for answered in &frame.answered {
-            work.remember(answered)?;
+            work.remember(answered.id, &answered.commit)?;
         }
         work.root.lineage = frame.lineage;
         work.root.version = frame.version.0;
@@ -282,7 +272,7 @@ impl<'a> Work<'a> {
         {
             return Err(refused("a rule cannot apply rules"));
         }
-        self.rules.push(RuleApplication {
+        self.graph.effects.rules.push(RuleApplication {
             rule: rule.to_owned(),
             binding,
         });
@@ -295,11 +285,11 @@ impl<'a> Work<'a> {
     /// Whether the edges of nodes that were given another type still join what they may.
     fn check_retyped(&self) -> Result<(), Refusal> {
         let is_retyped = |how: Touch| how == Touch::Replaced;
-        if !self.nodes.iter().any(|(_, (_, how, _))| is_retyped(*how)) {
+        let nodes = &self.graph.effects.nodes;
+        if !nodes.iter().any(|(_, (_, how, _))| is_retyped(*how)) {
             return Ok(());
         }
-        let retyped = self.nodes.iter();
-        let retyped = retyped.filter(|(_, (_, how, _))| is_retyped(*how));
+        let retyped = nodes.iter().filter(|(_, (_, how, _))| is_retyped(*how));
         let snapshot = self.snapshot();
         for (id, _) in retyped {
             let Some(node) = snapshot.find_node(*id).map_err(damaged)? else {
@@ -367,54 +357,43 @@ impl<'a> Work<'a> {
         }
     }
 
-    pub(super) fn finish(mut self, id: Option<TransactionId>) -> Result<Applied, Refusal> {
+    /// Writes what comes after all operations, and tells what the commit will be once it is published.
+    pub(super) fn finish(&mut self, id: Option<TransactionId>) -> Result<Commit, Refusal> {
         self.check_retyped()?;
         if self.schema_changed {
             let written = self.graph.write_schema(&mut self.root);
             self.room(written)?;
         }
-        if !self.rules.is_empty() {
+        let rules = &self.graph.effects.rules;
+        if !rules.is_empty() {
             // Encoding to memory cannot fail for these types; readers refuse an empty blob.
-            let bytes = postcard::to_stdvec(&self.rules).unwrap_or_default();
+            let bytes = postcard::to_stdvec(rules).unwrap_or_default();
             let written = record::write_blob(&mut self.graph.writer, &bytes);
             self.root.rules = self.room(written)?;
         }
-        if let Some(id) = id {
-            let commit = Commit {
-                version: Version(self.root.version),
-                time: self.root.time(),
-                created: self.created.clone(),
-                durable: false,
-            };
-            self.remember(&Answered { id, commit })?;
-        }
-        let change = Change {
-            epoch: self.graph.epoch,
+        let commit = Commit {
             version: Version(self.root.version),
             time: self.root.time(),
-            agent: self.agent,
-            rules: self.rules,
-            nodes: self
-                .nodes
-                .into_iter()
-                .map(|(node, (type_id, touch, attributes))| NodeChange {
-                    node,
-                    type_id,
-                    touch,
-                    attributes,
-                })
-                .collect(),
-            edges: self
-                .edges
-                .into_iter()
-                .map(|(edge, ((), touch, attributes))| EdgeChange {
-                    edge,
-                    touch,
-                    attributes,
-                })
-                .collect(),
+            created: std::mem::take(&mut self.created),
+            durable: false,
         };
-        Ok((self.root, self.created, change, self.forgotten))
+        if let Some(id) = id {
+            self.remember(id, &commit)?;
+        }
+        Ok(commit)
+    }
+
+    /// Shows the version to everybody; `id` is what [`Self::finish`] got.
+    pub(super) fn publish(self, id: Option<TransactionId>) {
+        let (graph, root) = (self.graph, &self.root);
+        graph.publish(root);
+        if let Some(id) = id {
+            graph.clients.insert(id.client, root.version);
+        }
+        if let Some(client) = self.forgotten {
+            graph.clients.remove(&client);
+        }
+        graph.is_settled = false;
     }
 }
 

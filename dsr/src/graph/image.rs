@@ -180,7 +180,7 @@ impl Graph {
         let root = apply::Work::restore(self, image);
         match root {
             Ok(root) => {
-                self.publish(root);
+                self.publish(&root);
                 let clients = image.frame.answered.iter();
                 self.clients = clients.map(|a| (a.id.client, a.commit.version.0)).collect();
                 Ok(())

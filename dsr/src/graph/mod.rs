@@ -11,6 +11,7 @@ mod writer;
 pub(crate) use answers::Answered;
 pub use answers::TransactionId;
 pub(crate) use apply::STORE;
+use apply::{Effects, Work};
 pub(crate) use image::{EdgeImage, Frame, NodeImage};
 pub use image::{Image, decode_image};
 pub use lease::LeaseRefusal;
@@ -62,9 +63,6 @@ pub trait RuleEngine: Send + Sync + fmt::Debug {
         Ok(None)
     }
 }
-
-/// A transaction applied, not yet published, and the rules to go by from it on where it brings others.
-type Outcome = (apply::Applied, Option<Arc<dyn RuleEngine>>);
 
 /// Knobs of the writer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -121,6 +119,8 @@ pub struct Graph {
     rights: Option<Rights>,
     /// The clients whose last transactions are known, with the versions that those made.
     clients: BTreeMap<u64, u64>,
+    /// What the last commit did.
+    effects: Effects,
     /// Whether nothing is left to do after the last commit.
     is_settled: bool,
     leases: Vec<Leased>,
@@ -162,6 +162,7 @@ impl Graph {
             rules: None,
             rights: None,
             clients: BTreeMap::new(),
+            effects: Effects::default(),
             is_settled: true,
             leases: Vec::new(),
             last_token: 0,
@@ -169,7 +170,7 @@ impl Graph {
         let mut root = graph.root;
         graph.write_schema(&mut root)?;
         root.version = 1;
-        graph.publish(root);
+        graph.publish(&root);
         Ok(graph)
     }
 
@@ -264,7 +265,7 @@ impl Graph {
     ) -> Result<(Commit, Change), Refusal> {
         let done = self.commit_once(transaction, agent, time, None);
         self.settle();
-        done
+        Ok((done?, self.last_change()))
     }
 
     /// Makes what a file says, each attribute with the time and agent that the file gives it, else
@@ -281,18 +282,19 @@ impl Graph {
         let transaction = world.transaction();
         let done = self.commit_stamped(&transaction, &world.stamps(), agent, time, None);
         self.settle();
-        done
+        Ok((done?, self.last_change()))
     }
 
     /// As [`Self::commit`], and notes the transaction's id, by which [`Self::answered`] then knows
-    /// it. What nobody has to wait for is left to [`Self::settle`].
+    /// it. What nobody has to wait for is left to [`Self::settle`], and what the commit changed is told by
+    /// [`Self::last_change`].
     pub(crate) fn commit_once(
         &mut self,
         transaction: &Transaction,
         agent: &str,
         time: Time,
         id: Option<TransactionId>,
-    ) -> Result<(Commit, Change), Refusal> {
+    ) -> Result<Commit, Refusal> {
         self.commit_stamped(transaction, &[], agent, time, id)
     }
 
@@ -303,47 +305,20 @@ impl Graph {
         agent: &str,
         time: Time,
         id: Option<TransactionId>,
-    ) -> Result<(Commit, Change), Refusal> {
+    ) -> Result<Commit, Refusal> {
         let before = (Arc::clone(&self.schema), Arc::clone(&self.writers));
-        let outcome = match self.try_commit(transaction, stamps, agent, time, id) {
-            Err(Refusal::OutOfMemory { .. }) => {
-                // History gives way before a commit is refused.
-                self.abandon(&before);
-                self.reclaim(0);
-                self.revoke_beyond(0);
-                self.try_commit(transaction, stamps, agent, time, id)
-            }
-            other => other,
-        };
-        match outcome {
-            Ok((applied, rules)) => {
-                let (root, created, change, forgotten) = applied;
-                if rules.is_some() {
-                    self.rules = rules;
-                }
-                self.publish(root);
-                if let Some(id) = id {
-                    self.clients.insert(id.client, root.version);
-                }
-                if let Some(client) = forgotten {
-                    self.clients.remove(&client);
-                }
-                self.is_settled = false;
-                Ok((
-                    Commit {
-                        version: Version(root.version),
-                        time,
-                        created,
-                        durable: false,
-                    },
-                    change,
-                ))
-            }
-            Err(refusal) => {
-                self.abandon(&before);
-                Err(refusal)
-            }
+        let mut outcome = self.try_commit(transaction, stamps, agent, time, id);
+        if let Err(Refusal::OutOfMemory { .. }) = outcome {
+            // History gives way before a commit is refused.
+            self.abandon(&before);
+            self.reclaim(0);
+            self.revoke_beyond(0);
+            outcome = self.try_commit(transaction, stamps, agent, time, id);
         }
+        if outcome.is_err() {
+            self.abandon(&before);
+        }
+        outcome
     }
 
     /// Gives up what history is too much after a commit, and gets ready for the next.
@@ -352,6 +327,7 @@ impl Graph {
             self.is_settled = true;
             self.reclaim(self.limits.history_bytes);
             self.writer.allocator.prepare(&self.writer.arena);
+            self.writer.arena.prepare_root(self.root.version + 1);
         }
     }
 
@@ -362,17 +338,42 @@ impl Graph {
         agent: &str,
         time: Time,
         id: Option<TransactionId>,
-    ) -> Result<Outcome, Refusal> {
-        let mut work = apply::Work::new(self, agent, time)?;
+    ) -> Result<Commit, Refusal> {
+        let mut work = Work::new(self, agent, time)?;
         work.require(&transaction.preconditions)?;
         work.apply(&transaction.operations)?;
         stamps.iter().try_for_each(|stamp| work.stamp(stamp))?;
-        let applied = work.finish(id)?;
-        let successor = match &self.rules {
-            Some(rules) => rules.successor(&self.snapshot_of(applied.0), &applied.2)?,
-            None => None,
-        };
-        Ok((applied, successor))
+        let commit = work.finish(id)?;
+        if let Some(rules) = &work.graph.rules {
+            let after = work.graph.snapshot_of(work.root);
+            let change = work.graph.change_of(&work.root);
+            let successor = rules.successor(&after, &change)?;
+            if successor.is_some() {
+                work.graph.rules = successor;
+            }
+        }
+        work.publish(id);
+        Ok(commit)
+    }
+
+    /// What the last commit changed.
+    pub(crate) fn last_change(&self) -> Change {
+        self.change_of(&self.root)
+    }
+
+    /// What the effects are of the commit that makes that root.
+    fn change_of(&self, root: &Root) -> Change {
+        let writer = root.agent.checked_sub(1);
+        let agent = writer.and_then(|writer| self.writers.get(writer as usize));
+        Change {
+            epoch: self.epoch,
+            version: Version(root.version),
+            time: root.time(),
+            agent: agent.cloned().unwrap_or_default(),
+            rules: self.effects.rules.clone(),
+            nodes: self.effects.nodes(),
+            edges: self.effects.edges(),
+        }
     }
 
     fn abandon(&mut self, before: &(Arc<Schema>, Arc<Vec<String>>)) {
@@ -381,9 +382,9 @@ impl Graph {
         self.writers = Arc::clone(&before.1);
     }
 
-    fn publish(&mut self, root: Root) {
-        self.writer.publish(self.root.version, &root);
-        self.root = root;
+    fn publish(&mut self, root: &Root) {
+        self.writer.publish(self.root.version, root);
+        self.root = *root;
     }
 
     fn reclaim(&mut self, keep_bytes: usize) {

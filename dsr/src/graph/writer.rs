@@ -99,22 +99,34 @@ impl Writer {
         at: usize,
         word: u64,
     ) -> Result<Address, Full> {
+        let own = self.own(address, len)?;
+        self.overwrite(own, at, &[word]);
+        Ok(own)
+    }
+
+    /// A block like the one of `len` words at `address`, in its place, that may be written over: itself where
+    /// nobody else can see it yet.
+    pub(crate) fn own(&mut self, address: Address, len: usize) -> Result<Address, Full> {
         if self.allocator.is_fresh(address) {
-            let block = self.arena.block(address, len).unwrap_or(&[]);
-            if let Some(place) = block.get(at) {
-                place.store(word);
-            }
             return Ok(address);
         }
         let new = self.allocator.allocate(&self.arena, len)?;
         let blocks = (self.arena.block(address, len), self.arena.block(new, len));
         if let (Some(from), Some(to)) = blocks {
-            for (index, (to, from)) in to.iter().zip(from).enumerate() {
-                to.store(if index == at { word } else { from.load() });
+            for (to, from) in to.iter().zip(from) {
+                to.store(from.load());
             }
         }
         self.retire(address, len);
         Ok(new)
+    }
+
+    /// Writes over words of an own block, from the one `at` a place on.
+    pub(crate) fn overwrite(&self, own: Address, at: usize, words: &[u64]) {
+        let block = self.arena.block(own, at + words.len()).unwrap_or(&[]);
+        for (to, from) in block.iter().skip(at).zip(words) {
+            to.store(*from);
+        }
     }
 
     pub(crate) fn retire(&mut self, address: Address, words: usize) {

@@ -3,6 +3,7 @@
 
 mod answer;
 mod desks;
+mod news;
 
 use super::arena::ArenaPublisher;
 use super::lease::Landlord;
@@ -17,12 +18,13 @@ use crate::{
     Change, Commit, Durability, Epoch, Graph, Refusal, Schema, State, StateError, Time,
     Transaction, TransactionId, Version,
 };
-use answer::Answered;
+use answer::{Answered, reply};
 use desks::Desks;
 use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::server::Server;
 use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
+use news::News;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use thiserror::Error;
@@ -96,8 +98,7 @@ pub struct Store {
     looks: u32,
     /// Whether anything was answered since then.
     is_busy: bool,
-    /// Whether somebody may sleep who has to hear of something.
-    has_news: bool,
+    news: News,
     began: Instant,
     next_look: Instant,
     /// Where answers are put together; empty between uses.
@@ -164,7 +165,7 @@ impl Store {
             desks,
             looks: 0,
             is_busy: false,
-            has_news: false,
+            news: News::default(),
             began,
             next_look: began,
             scratch: Vec::new(),
@@ -233,14 +234,14 @@ impl Store {
     pub fn commit(&mut self, transaction: &Transaction, time: Time) -> Result<Commit, Refusal> {
         let answer = self.decide(transaction, STORE, time, None);
         self.tell();
-        self.ring();
+        let due = self.news.is_due_at_last();
+        self.ring_if(due);
         self.settle();
         answer
     }
 
-    /// Wakes who has to hear of something.
-    fn ring(&mut self) {
-        if std::mem::take(&mut self.has_news) {
+    fn ring_if(&self, due: bool) {
+        if due {
             bell::ring(self.graph.arena());
         }
     }
@@ -258,13 +259,19 @@ impl Store {
         if durable {
             self.can_keep()?;
         }
-        let (commit, change) = self
+        let commit = self
             .graph
             .commit_once(transaction, agent, self.last_time, id)?;
-        if let Some(keeper) = &self.keeper {
-            keeper.note(&change, self.graph.snapshot(), durable);
+        let follow = self.changes.has_listeners();
+        if follow || self.keeper.is_some() {
+            let change = self.graph.last_change();
+            if let Some(keeper) = &self.keeper {
+                keeper.note(&change, self.graph.snapshot(), durable);
+            }
+            if follow {
+                self.unsent.push(change);
+            }
         }
-        self.unsent.push(change);
         Ok(commit)
     }
 
@@ -273,7 +280,7 @@ impl Store {
         if self.unsent.is_empty() || !self.changes.has_listeners() {
             return;
         }
-        self.has_news = true;
+        self.news.committed();
         if let Err(error) = self.changes.send(&self.unsent) {
             // The commits stand; who listens sees the gap and reads the snapshot.
             tracing::warn!("{} changes were not sent: {error}", self.unsent.len());
@@ -370,17 +377,21 @@ impl Store {
                     break;
                 }
             }
-            self.ring();
+            let due = self.news.is_due_after_look();
+            self.ring_if(due);
             if served > 0 {
                 self.is_busy = true;
                 return Ok(served);
             }
             std::hint::spin_loop();
         }
+        let due = self.news.is_due_at_last();
+        self.ring_if(due);
         self.sleep(patience)?;
         self.welcome(now())?;
         let served = self.answer_desks() + self.answer_all()?;
-        self.ring();
+        let due = self.news.is_due_after_look();
+        self.ring_if(due);
         self.is_busy = served > 0;
         Ok(served)
     }
@@ -457,23 +468,11 @@ impl Store {
             }
             self.settle();
         }
-        self.has_news |= served > 0;
+        if served > 0 {
+            self.news.answered();
+        }
         Ok(served)
     }
-}
-
-/// Answers a request.
-fn reply(asker: &Asker, answers: &[Answer], scratch: &mut Vec<u8>) -> Result<(), InstanceError> {
-    let mut bytes = std::mem::take(scratch);
-    bytes.clear();
-    let bytes = postcard::to_extend(answers, bytes).map_err(|e| ipc("encoding an answer", e))?;
-    match asker.loan_slice_uninit(bytes.len()) {
-        // A client that went away meanwhile does not hear; that is its affair.
-        Ok(response) => drop(response.write_from_slice(&bytes).send()),
-        Err(error) => tracing::warn!("an answer was not sent: {error}"),
-    }
-    *scratch = bytes;
-    Ok(())
 }
 
 /// A number that no other store of this instance had: the time of day, in nanoseconds.

@@ -3,10 +3,11 @@
 
 use super::{Work, read};
 use crate::arena::Address;
+use crate::arena::record::{NodeInPlace, SINCE, VERSION};
 use crate::arena::table::{AttributeRecord, Place, Stored, Table};
 use crate::interchange::Stamp;
 use crate::rights::Carrier;
-use crate::{AttributeId, NodeId, Owner, Refusal, Touch, TypeId, Value};
+use crate::{AttributeId, NodeId, NodeRef, Owner, Refusal, Touch, TypeId, Value};
 
 impl Work<'_> {
     /// Retires an attribute with its history.
@@ -95,8 +96,7 @@ impl Work<'_> {
         value: &Value,
     ) -> Result<AttributeId, Refusal> {
         let attribute = self.attribute_id(name)?;
-        self.may(|rights, schema| rights.attribute(schema, carrier, attribute))?;
-        self.schema().check_value(attribute, value)?;
+        self.check_write(carrier, attribute, value)?;
         let place = table.find(attribute.0);
         let older = match (self.schema().history(attribute), place) {
             (0, _) => None,
@@ -125,6 +125,17 @@ impl Work<'_> {
         Ok(attribute)
     }
 
+    /// Whether this commit may give the attribute that value.
+    fn check_write(
+        &self,
+        carrier: Carrier,
+        attribute: AttributeId,
+        value: &Value,
+    ) -> Result<(), Refusal> {
+        self.may(|rights, schema| rights.attribute(schema, carrier, attribute))?;
+        Ok(self.schema().check_value(attribute, value)?)
+    }
+
     /// Says of an attribute that this commit wrote when and by whom it was written.
     pub(in crate::graph) fn stamp(&mut self, stamp: &Stamp) -> Result<(), Refusal> {
         let Some(value) = self.value_of(&stamp.owner, &stamp.name)? else {
@@ -143,6 +154,45 @@ impl Work<'_> {
         written
     }
 
+    /// Sets an attribute of a node that takes as much room as before in the node's record, as most do: of that
+    /// only a few words change. False, and nothing is done, where it is not such a one.
+    fn overwrite(&mut self, node: &NodeRef, name: &str, value: &Value) -> Result<bool, Refusal> {
+        let schema = self.schema();
+        let Some(name) = schema
+            .find_attribute(name)
+            .filter(|&name| !schema.has_index(name) && schema.history(name) == 0)
+        else {
+            return Ok(false);
+        };
+        let address = self.address(node)?;
+        let words = self.graph.writer.arena.from(address).unwrap_or(&[]);
+        let Some((node, at)) = NodeInPlace::with_small(words, name.0) else {
+            return Ok(false);
+        };
+        let (id, type_id) = (NodeId(node.id), TypeId(node.type_id));
+        self.check_write(Carrier::Node(type_id), name, value)?;
+        let (stamp, since, writer) = (self.stamp, self.root.version, &mut self.graph.writer);
+        let mut words = std::mem::take(&mut writer.scratch);
+        words.clear();
+        let head = (stamp.version, stamp.time, stamp.writer);
+        AttributeRecord::encode(&mut words, value, head, None);
+        let fits = words.len() == at.len();
+        let own = fits.then(|| writer.own(address, node.len)).transpose();
+        if let Ok(Some(own)) = own {
+            writer.overwrite(own, VERSION, &[stamp.record]);
+            writer.overwrite(own, SINCE, &[since]);
+            writer.overwrite(own, at.start, &words);
+        }
+        writer.scratch = words;
+        let Some(own) = self.room(own)? else {
+            return Ok(false);
+        };
+        self.lead(id.0, address, own)?;
+        let nodes = &mut self.graph.effects.nodes;
+        nodes.touch(id, type_id, Touch::Updated, Some(name));
+        Ok(true)
+    }
+
     pub(super) fn change_attribute(
         &mut self,
         owner: &Owner,
@@ -151,6 +201,11 @@ impl Work<'_> {
     ) -> Result<(), Refusal> {
         match owner {
             Owner::Node(node) => {
+                if let Some(value) = value
+                    && self.overwrite(node, name, value)?
+                {
+                    return Ok(());
+                }
                 let (address, mut record) = self.node(node)?;
                 let len = record.len();
                 let before = self.indexed_place(&record.table, name)?;
@@ -161,8 +216,12 @@ impl Work<'_> {
                 record.version = self.stamp.record;
                 self.put_node(Some((address, len)), &record)?;
                 let type_id = TypeId(record.type_id);
-                self.nodes
-                    .touch(NodeId(record.id), type_id, Touch::Updated, Some(name));
+                self.graph.effects.nodes.touch(
+                    NodeId(record.id),
+                    type_id,
+                    Touch::Updated,
+                    Some(name),
+                );
             }
             Owner::Edge(edge) => {
                 let (key, end, mut record) = self.edge(edge)?;
@@ -171,7 +230,10 @@ impl Work<'_> {
                 let name = self.change_row(carrier, &mut record.table, name, value)?;
                 record.version = self.stamp.record;
                 self.put_edge(key, (end, len), &record)?;
-                self.edges.touch(key, (), Touch::Updated, Some(name));
+                self.graph
+                    .effects
+                    .edges
+                    .touch(key, (), Touch::Updated, Some(name));
             }
         }
         Ok(())

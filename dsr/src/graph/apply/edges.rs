@@ -74,10 +74,13 @@ impl Work<'_> {
         } else {
             Touch::Created
         };
-        self.edges.touch(key, (), how, None);
+        self.graph.effects.edges.touch(key, (), how, None);
         for (name, value) in attributes {
             let name = self.set_row(Carrier::Edge(label), &mut record.table, name, value)?;
-            self.edges.touch(key, (), Touch::Updated, Some(name));
+            self.graph
+                .effects
+                .edges
+                .touch(key, (), Touch::Updated, Some(name));
         }
         let end = existing.map_or(record::end(to.type_id, 0), |(_, end)| end);
         self.put_edge(key, (end, len), &record)?;
@@ -148,7 +151,10 @@ impl Work<'_> {
         self.root.labels = self.index(directory, key.label.0, [key.from.0, key.to.0], None)?;
         self.root.edge_count -= 1;
         self.count_triple(key.label, [from_type, to.type_id], false)?;
-        self.edges.touch(key, (), Touch::Deleted, None);
+        self.graph
+            .effects
+            .edges
+            .touch(key, (), Touch::Deleted, None);
         Ok(())
     }
 

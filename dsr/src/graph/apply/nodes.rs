@@ -5,6 +5,7 @@ use super::{Work, damaged, read};
 use crate::arena::record::{self, NodeRecord};
 use crate::arena::table::Table;
 use crate::arena::{Address, cells, tree, trie};
+use crate::graph::Writer;
 use crate::rights::Carrier;
 use crate::value::hash;
 use crate::{AttributeId, NodeId, NodeRef, Refusal, SchemaError, Touch, TypeId, Value};
@@ -25,16 +26,28 @@ impl Work<'_> {
     }
 
     pub(super) fn node(&self, node: &NodeRef) -> Result<(Address, NodeRecord), Refusal> {
+        let address = self.address(node)?;
+        let record = NodeRecord::read(&self.graph.writer.arena, address);
+        Ok((address, read(record)?))
+    }
+
+    /// Where a node's record lies.
+    pub(super) fn address(&self, node: &NodeRef) -> Result<Address, Refusal> {
         let id = match node {
             NodeRef::Id(id) => *id,
             NodeRef::Name(_) => self
                 .find(node)?
                 .ok_or_else(|| Refusal::NotFound(node.to_string()))?,
         };
-        let arena = &self.graph.writer.arena;
-        let address = read(trie::find(arena, self.root.nodes, id.0))?
-            .ok_or_else(|| Refusal::NotFound(node.to_string()))?;
-        Ok((address, read(NodeRecord::read(arena, address))?))
+        let Writer { arena, moved, .. } = &self.graph.writer;
+        // The cells do not know what this commit did.
+        if moved.is_empty()
+            && let Some((address, _)) = cells::find(arena, &self.root, id.0)
+        {
+            return Ok(address);
+        }
+        read(trie::find(arena, self.root.nodes, id.0))?
+            .ok_or_else(|| Refusal::NotFound(node.to_string()))
     }
 
     pub(super) fn put_node(
@@ -42,15 +55,23 @@ impl Work<'_> {
         old: Option<(Address, usize)>,
         node: &NodeRecord,
     ) -> Result<(), Refusal> {
-        let (since, writer) = (self.root.version, &mut self.graph.writer);
-        let put = writer.put(old, |words| node.encode(since, words));
-        let put = put.and_then(|at| {
-            if old.is_none_or(|(address, _)| address != at) {
-                writer.moved.push((node.id, at));
-            }
-            trie::insert(writer, self.root.nodes, node.id, at)
-        });
-        self.root.nodes = self.room(put)?;
+        let since = self.root.version;
+        let put = self
+            .graph
+            .writer
+            .put(old, |words| node.encode(since, words));
+        let address = self.room(put)?;
+        self.lead(node.id, old.map_or(0, |(address, _)| address), address)
+    }
+
+    /// Leads to a node's record at `new` what led to the one at `old`, if there was one.
+    pub(super) fn lead(&mut self, id: u64, old: Address, new: Address) -> Result<(), Refusal> {
+        let writer = &mut self.graph.writer;
+        if old != new {
+            writer.moved.push((id, new));
+        }
+        let nodes = trie::insert(writer, self.root.nodes, id, new);
+        self.root.nodes = self.room(nodes)?;
         Ok(())
     }
 
@@ -87,12 +108,18 @@ impl Work<'_> {
             into: 0,
             table: Table::default(),
         };
-        self.nodes.touch(id, type_id, Touch::Created, None);
+        self.graph
+            .effects
+            .nodes
+            .touch(id, type_id, Touch::Created, None);
         for (name, value) in attributes {
             let before = self.indexed_place(&node.table, name)?;
             let name = self.set_row(Carrier::Node(type_id), &mut node.table, name, value)?;
             self.index_value(name, id, before, value.place())?;
-            self.nodes.touch(id, type_id, Touch::Updated, Some(name));
+            self.graph
+                .effects
+                .nodes
+                .touch(id, type_id, Touch::Updated, Some(name));
         }
         let blob = record::write_blob(&mut self.graph.writer, name.as_bytes());
         node.name = self.room(blob)?;
@@ -179,7 +206,9 @@ impl Work<'_> {
         self.root.names = self.room(names)?;
         self.index_type(TypeId(node.type_id), id, false)?;
         self.root.node_count -= 1;
-        self.nodes
+        self.graph
+            .effects
+            .nodes
             .touch(id, TypeId(node.type_id), Touch::Deleted, None);
         Ok(())
     }
@@ -203,7 +232,10 @@ impl Work<'_> {
         node.type_id = type_id.0;
         node.version = self.stamp.record;
         self.put_node(Some((address, len)), &node)?;
-        self.nodes.touch(id, type_id, Touch::Replaced, None);
+        self.graph
+            .effects
+            .nodes
+            .touch(id, type_id, Touch::Replaced, None);
         Ok(())
     }
 

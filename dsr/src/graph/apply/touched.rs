@@ -1,11 +1,47 @@
 //! What a commit has touched so far. It guarantees that each node or edge is there once, in order, with
 //! what became of it in all.
 
-use crate::{AttributeId, Touch};
+use crate::{AttributeId, EdgeChange, EdgeKey, NodeChange, NodeId, RuleApplication, Touch, TypeId};
+use smallvec::SmallVec;
 use std::collections::{BTreeMap, btree_map};
 
+/// What a commit did, for whoever asks before the next one.
+#[derive(Debug, Default)]
+pub(in crate::graph) struct Effects {
+    pub(super) nodes: Touched<NodeId, TypeId>,
+    pub(super) edges: Touched<EdgeKey, ()>,
+    pub(in crate::graph) rules: Vec<RuleApplication>,
+}
+
+impl Effects {
+    pub(super) fn clear(&mut self) {
+        self.nodes.clear();
+        self.edges.clear();
+        self.rules.clear();
+    }
+
+    pub(in crate::graph) fn nodes(&self) -> Vec<NodeChange> {
+        let change = |(&node, (type_id, touch, attributes)): (&_, &What<_>)| NodeChange {
+            node,
+            type_id: *type_id,
+            touch: *touch,
+            attributes: attributes.to_vec(),
+        };
+        self.nodes.iter().map(change).collect()
+    }
+
+    pub(in crate::graph) fn edges(&self) -> Vec<EdgeChange> {
+        let change = |(&edge, ((), touch, attributes)): (&_, &What<_>)| EdgeChange {
+            edge,
+            touch: *touch,
+            attributes: attributes.to_vec(),
+        };
+        self.edges.iter().map(change).collect()
+    }
+}
+
 /// What became of one: what else is to be known of it, how, and which attributes.
-type What<V> = (V, Touch, Vec<AttributeId>);
+type What<V> = (V, Touch, SmallVec<[AttributeId; 4]>);
 
 /// Everything that was touched.
 #[derive(Debug)]
@@ -48,8 +84,9 @@ impl<K: Ord, V> Touched<K, V> {
         one.chain(&self.several)
     }
 
-    pub(super) fn into_iter(self) -> impl Iterator<Item = (K, What<V>)> {
-        self.one.into_iter().chain(self.several)
+    fn clear(&mut self) {
+        self.one = None;
+        self.several.clear();
     }
 }
 

@@ -145,11 +145,11 @@ fn cells_of_a_version_that_is_never_published_show_nothing_of_it() {
     let mut transaction = Transaction::new();
     transaction.operations = vec![set(1, 100), create(4)];
     transaction.delete_node(NodeId(2));
-    let (applied, _) = graph
-        .try_commit(&transaction, &[], "a", Time::default(), None)
-        .unwrap();
-    let writer = &mut graph.writer;
-    cells::set(&writer.arena, &applied.0, &mut writer.moved);
+    let mut work = Work::new(&mut graph, "a", Time::default()).unwrap();
+    work.apply(&transaction.operations).unwrap();
+    work.finish(None).unwrap();
+    let (root, writer) = (work.root, &mut graph.writer);
+    cells::set(&writer.arena, &root, &mut writer.moved);
     let newest = Snapshot::new(
         Arc::clone(&before.arena),
         before.arena.newest_root().unwrap(),

@@ -1,20 +1,25 @@
 //! What the store answers to a request. This file guarantees that a transaction is applied once
 //! however often it is asked for, and for nobody who may not ask.
 
-use super::{Answer, Store};
+use super::{Answer, Asker, Store};
 use crate::graph::STORE;
 use crate::shm::session::Request;
+use crate::shm::{InstanceError, ipc};
 use crate::{Refusal, TransactionId};
+use smallvec::{SmallVec, smallvec};
 use std::cmp::Ordering;
 
 /// Clients whose last requests are remembered.
 const CLIENTS: usize = 1024;
 
+/// The answers to a request, which mostly holds one transaction.
+pub(super) type Answers = SmallVec<[Answer; 1]>;
+
 /// What became of a client's last request.
 #[derive(Debug)]
 pub(super) struct Answered {
     pub(super) sequence: u64,
-    pub(super) answers: Vec<Answer>,
+    pub(super) answers: Answers,
     /// When it came, in requests.
     round: u64,
 }
@@ -43,7 +48,7 @@ impl Store {
             }
         }
         let answers = match known {
-            Some(answer) => vec![answer],
+            Some(answer) => smallvec![answer],
             None => self.decide_all(request),
         };
         if answers.iter().any(Result::is_ok) {
@@ -67,9 +72,9 @@ impl Store {
         true
     }
 
-    fn decide_all(&mut self, request: &Request) -> Vec<Answer> {
+    fn decide_all(&mut self, request: &Request) -> Answers {
         if let Err(refusal) = self.identify(request) {
-            return vec![Err(refusal); request.transactions.len()];
+            return smallvec![Err(refusal); request.transactions.len()];
         }
         let Request {
             client, sequence, ..
@@ -101,4 +106,22 @@ impl Store {
             _ => Ok(()),
         }
     }
+}
+
+/// Answers a request.
+pub(super) fn reply(
+    asker: &Asker,
+    answers: &[Answer],
+    scratch: &mut Vec<u8>,
+) -> Result<(), InstanceError> {
+    let mut bytes = std::mem::take(scratch);
+    bytes.clear();
+    let bytes = postcard::to_extend(answers, bytes).map_err(|e| ipc("encoding an answer", e))?;
+    match asker.loan_slice_uninit(bytes.len()) {
+        // A client that went away meanwhile does not hear; that is its affair.
+        Ok(response) => drop(response.write_from_slice(&bytes).send()),
+        Err(error) => tracing::warn!("an answer was not sent: {error}"),
+    }
+    *scratch = bytes;
+    Ok(())
 }

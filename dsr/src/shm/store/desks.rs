@@ -159,9 +159,12 @@ impl Store {
             Laid::ByRequest => desk::answer(slot, sequence, None),
             Laid::Answered(length) => desk::answer(slot, sequence, bytes.get(..length)),
         }
-        self.has_news |= desk::is_asleep(desk::request_of(desk.page.words()));
+        if desk::is_asleep(desk::request_of(desk.page.words())) {
+            self.news.answered();
+        }
         desk.request.transactions.clear();
-        self.ring();
+        let due = self.news.is_due_after_look();
+        self.ring_if(due);
         self.settle();
         true
     }
