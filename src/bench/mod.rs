@@ -1,5 +1,6 @@
 //! Measuring what Cortex is made of: the shared graph beside raw iceoryx2 and a copy on the heap, the
-//! planner from text to plan, rules beside other matchers, social maps beside numpy. It guarantees
+//! planner from text to plan, rules beside other matchers, social maps beside numpy, path search beside
+//! others. It guarantees
 //! that a figure and the one it is compared with come from the same run, taken in turns where both are
 //! short.
 //!
@@ -12,10 +13,12 @@
 )]
 
 mod beside;
+mod chance;
 mod commits;
 mod figure;
 mod hall;
 mod indoor;
+mod path;
 mod peer;
 mod plan;
 mod quantity;
@@ -27,6 +30,7 @@ mod social;
 mod whole;
 
 pub(crate) use figure::{Figure, table};
+pub(crate) use path::paths;
 pub(crate) use peer::play;
 pub(crate) use plan::plans;
 pub(crate) use quantity::{Quantity, table as quantities_table};

@@ -41,6 +41,9 @@ pub(crate) enum BenchAction {
         #[arg(long, value_name = "DIR")]
         tasks: Option<PathBuf>,
     },
+    /// Path search and the elastic band
+    #[command(after_help = "Takes half a minute.\n\nExample:\n  cortex bench path")]
+    Path,
 }
 
 /// A process that a measurement starts.

@@ -50,6 +50,9 @@ pub(crate) enum PathAlgorithm {
     /// By cost so far and the least that can remain
     #[value(name = "astar")]
     AStar,
+    /// The search of a planner that goes on with it when the map changes (D* Lite)
+    #[value(name = "dstar_lite")]
+    DStarLite,
 }
 
 fn cell(text: &str) -> Result<(usize, usize), String> {

@@ -15,6 +15,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
         BenchAction::Rules => return tell(&bench::rules()?, arguments.json),
         BenchAction::Social => return tell(&bench::social()?, arguments.json),
         BenchAction::Plan { tasks } => bench::plans(tasks.as_deref())?,
+        BenchAction::Path => bench::paths()?,
     };
     if arguments.json {
         let figures: Vec<_> = figures.iter().map(bench::Figure::to_json).collect();

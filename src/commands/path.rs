@@ -5,7 +5,9 @@ use super::output::{print, print_json};
 use crate::cli::{self, Path as Arguments};
 use crate::{Answer, Failure};
 use agents::grid::{Cell, CostGrid};
-use agents::navigation::path::{Algorithm, CostModel, Path, Request, Search, length_of};
+use agents::navigation::path::{
+    Algorithm, CostModel, Path, PathError, Replanner, Request, Search, length_of,
+};
 use scenarios::grid_file::{parse_map, parse_problems};
 use serde_json::json;
 use std::fmt::Write as _;
@@ -25,19 +27,31 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     }
 }
 
-fn request(arguments: &Arguments, from: Cell, to: Cell) -> Request {
-    Request {
-        model: match arguments.model {
-            cli::CostModel::LengthMean => CostModel::LengthMean,
-            cli::CostModel::LengthDest => CostModel::LengthDest,
-            cli::CostModel::NodeSum => CostModel::NodeSum,
-        },
-        algorithm: match arguments.algorithm {
-            cli::PathAlgorithm::Dijkstra => Algorithm::Dijkstra,
-            cli::PathAlgorithm::AStar => Algorithm::AStar,
-        },
+/// The cheapest path as the arguments ask for it.
+fn cheapest(
+    arguments: &Arguments,
+    search: &mut Search,
+    grid: &CostGrid,
+    (from, to): (Cell, Cell),
+) -> Result<Path, PathError> {
+    let model = match arguments.model {
+        cli::CostModel::LengthMean => CostModel::LengthMean,
+        cli::CostModel::LengthDest => CostModel::LengthDest,
+        cli::CostModel::NodeSum => CostModel::NodeSum,
+    };
+    let algorithm = match arguments.algorithm {
+        cli::PathAlgorithm::Dijkstra => Algorithm::Dijkstra,
+        cli::PathAlgorithm::AStar => Algorithm::AStar,
+        cli::PathAlgorithm::DStarLite => {
+            return Replanner::new(grid, to, model)?.find(grid, from);
+        }
+    };
+    let request = Request {
+        model,
+        algorithm,
         ..Request::new(from, to)
-    }
+    };
+    search.find(grid, &request)
 }
 
 fn find(arguments: &Arguments, grid: &CostGrid, from: Cell, to: Cell) -> Result<Answer, Failure> {
@@ -49,7 +63,7 @@ fn find(arguments: &Arguments, grid: &CostGrid, from: Cell, to: Cell) -> Result<
             )));
         }
     }
-    match Search::default().find(grid, &request(arguments, from, to)) {
+    match cheapest(arguments, &mut Search::default(), grid, (from, to)) {
         Ok(path) => {
             let length = length_of(&path.cells);
             if arguments.json {
@@ -97,7 +111,8 @@ fn check(
     let mut search = Search::default();
     let mut mismatches = Vec::new();
     for problem in &problems {
-        let found = search.find(grid, &request(arguments, problem.start, problem.goal));
+        let ends = (problem.start, problem.goal);
+        let found = cheapest(arguments, &mut search, grid, ends);
         let length = found.as_ref().map(|path| length_of(&path.cells));
         if !length
             .as_ref()

@@ -42,7 +42,7 @@ fn each_cost_model_finds_its_own_cheapest_path() {
     let ends = ["--grid", "@a.wmap", "--from", "0,0", "--to", "3,0"];
     // Along the top the three steps cost 2.5, 4 and 2.5 by the mean; below it is seven steps of 1.
     for (model, cost, length) in [("length_mean", 7.0, 7.0), ("length_dest", 7.0, 7.0)] {
-        for algorithm in ["astar", "dijkstra"] {
+        for algorithm in ["astar", "dijkstra", "dstar_lite"] {
             let mut words = ends.to_vec();
             words.extend(["--model", model, "--algorithm", algorithm]);
             let (code, answer, error) = path(&folder, &words);

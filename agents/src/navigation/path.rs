@@ -4,9 +4,15 @@
 //! The graph is 8-connected; a diagonal step needs both orthogonal neighbours free (READING.md
 //! item 8), so a path never cuts the corner of an obstacle.
 
+mod lattice;
+mod queue;
+mod replanner;
+
+pub use replanner::Replanner;
+
 use crate::grid::{BLOCKED, Cell, CostGrid};
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use lattice::{BESIDE, Lattice, STEPS};
+use queue::{Queue, Waiting};
 use std::f64::consts::SQRT_2;
 use thiserror::Error;
 
@@ -107,34 +113,23 @@ pub enum PathError {
     },
 }
 
-/// A node waiting to be looked at: total estimate, estimate to the goal (of equal totals the node
-/// nearer to the goal goes first), index. Bits of non-negative floats order like the floats.
-type Waiting = Reverse<(u64, u32, u32)>;
-
 /// A path search that keeps its memory from one call to the next.
 #[derive(Debug, Clone, Default)]
 pub struct Search {
-    /// Node costs with a blocked border around, so that no step needs a bounds check of its own.
-    costs: Vec<f64>,
-    cost_so_far: Vec<f64>,
-    /// The direction, an index of [`STEPS`], by which each node was reached.
-    reached_by: Vec<u8>,
-    open: BinaryHeap<Waiting>,
-    stride: usize,
-    least_cost: f64,
+    lattice: Lattice,
+    nodes: Vec<Node>,
+    open: Queue,
 }
 
-/// Columns and rows of the eight steps: four straight, then four diagonal ones.
-const STEPS: [(isize, isize); 8] = [
-    (1, 0),
-    (-1, 0),
-    (0, 1),
-    (0, -1),
-    (1, 1),
-    (-1, 1),
-    (1, -1),
-    (-1, -1),
-];
+/// What the search knows of a node.
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    cost_so_far: f64,
+    /// As in the lattice: beside the cost so far, so that looking at a neighbour is one look.
+    cost: f32,
+    /// The direction, an index of [`STEPS`], by which the node was reached.
+    reached_by: u8,
+}
 
 impl Search {
     /// The cheapest path that answers `request` on `grid`.
@@ -151,13 +146,7 @@ impl Search {
             tolerance,
             ..
         } = request;
-        let outside = |cell: Cell| cell.0 >= grid.width || cell.1 >= grid.height;
-        if outside(start) {
-            return Err(PathError::StartOutside(start));
-        }
-        if outside(goal) {
-            return Err(PathError::GoalOutside(goal));
-        }
+        check_inside(grid, start, goal)?;
         let starts = free_cells_near(grid, start, if free(grid, start) { 0.0 } else { tolerance });
         if starts.is_empty() {
             return Err(PathError::StartBlocked { start, tolerance });
@@ -166,7 +155,7 @@ impl Search {
         let Some(&nearest_goal) = goals.first() else {
             return Err(PathError::GoalBlocked { goal, tolerance });
         };
-        self.load(grid);
+        self.lattice.load(grid);
         // A search that does not meet the nearest goal has seen all that its start can reach, so
         // each further search begins in a part of the grid not seen before.
         let mut seen = vec![false; starts.len()];
@@ -189,73 +178,17 @@ impl Search {
         })
     }
 
-    fn load(&mut self, grid: &CostGrid) {
-        self.stride = grid.width + 2;
-        let size = self.stride * (grid.height + 2);
-        self.costs.clear();
-        self.costs.resize(size, f64::INFINITY);
-        self.least_cost = f64::INFINITY;
-        for row in 0..grid.height {
-            let from = &grid.costs[row * grid.width..(row + 1) * grid.width];
-            let into = &mut self.costs[(row + 1) * self.stride + 1..][..grid.width];
-            for (into, &cost) in into.iter_mut().zip(from) {
-                // NaN and negative costs have no meaning: such a cell is not entered.
-                *into = if cost >= 0.0 {
-                    f64::from(cost)
-                } else {
-                    f64::INFINITY
-                };
-                self.least_cost = self.least_cost.min(*into);
-            }
-        }
-    }
-
-    fn padded(&self, cell: Cell) -> usize {
-        (cell.1 + 1) * self.stride + cell.0 + 1
-    }
-
     fn reached(&self, cell: Cell) -> bool {
-        self.cost_so_far[self.padded(cell)].is_finite()
+        self.nodes[self.lattice.node(cell)].cost_so_far.is_finite()
     }
 
     /// Searches from `start` until `goal` is settled or nothing is left.
     fn expand(&mut self, start: Cell, goal: Cell, request: &Request) {
-        match request.model {
-            CostModel::LengthMean => {
-                self.expand_with(start, goal, request, |from, to, length| {
-                    length * 0.5 * (from + to)
-                });
-            }
-            CostModel::LengthDest => {
-                self.expand_with(start, goal, request, |_, to, length| length * to);
-            }
-            CostModel::NodeSum => self.expand_with(start, goal, request, |_, to, _| to),
-        }
-    }
-
-    fn expand_with(
-        &mut self,
-        start: Cell,
-        goal: Cell,
-        request: &Request,
-        price: impl Fn(f64, f64, f64) -> f64,
-    ) {
         match request.algorithm {
-            Algorithm::Dijkstra => self.search(start, goal, price, |_| 0.0),
+            Algorithm::Dijkstra => self.search(start, goal, request.model, |_| 0.0),
             Algorithm::AStar => {
-                let (stride, least) = (self.stride, self.least_cost);
-                let (x, y) = (goal.0 + 1, goal.1 + 1);
-                // Under NodeSum a diagonal step costs no more than a straight one.
-                let diagonal = if request.model == CostModel::NodeSum {
-                    1.0
-                } else {
-                    SQRT_2
-                } - 1.0;
-                self.search(start, goal, price, |node| {
-                    let across = (node % stride).abs_diff(x) as f64;
-                    let along = (node / stride).abs_diff(y) as f64;
-                    least * (across.max(along) + diagonal * across.min(along))
-                });
+                let estimate = self.lattice.estimate_to(goal, request.model);
+                self.search(start, goal, request.model, estimate);
             }
         }
     }
@@ -264,61 +197,58 @@ impl Search {
         &mut self,
         start: Cell,
         goal: Cell,
-        price: impl Fn(f64, f64, f64) -> f64,
+        model: CostModel,
         estimate: impl Fn(usize) -> f64,
     ) {
-        let size = self.costs.len();
-        self.cost_so_far.clear();
-        self.cost_so_far.resize(size, f64::INFINITY);
-        self.reached_by.clear();
-        self.reached_by.resize(size, u8::MAX);
-        self.open.clear();
-        let stride = self.stride.cast_signed();
-        let steps = STEPS.map(|(column, row)| row * stride + column);
-        let waiting = |node: usize, cost: f64| {
-            let estimate = estimate(node);
-            Reverse((
-                (cost + estimate).to_bits(),
-                (estimate as f32).to_bits(),
-                node as u32,
-            ))
-        };
-        let (start, goal) = (self.padded(start), self.padded(goal));
-        self.cost_so_far[start] = 0.0;
-        self.open.push(waiting(start, 0.0));
-        while let Some(next) = self.open.pop() {
-            let node = next.0.2 as usize;
-            if node == goal {
+        let Self {
+            lattice,
+            nodes,
+            open,
+        } = self;
+        nodes.clear();
+        nodes.extend(lattice.costs.iter().map(|&cost| Node {
+            cost_so_far: f64::INFINITY,
+            cost,
+            reached_by: u8::MAX,
+        }));
+        // No step raises a total estimate by more than its own price and what it may lead away.
+        open.clear(2.0 * SQRT_2 * f64::from(lattice.greatest));
+        let steps = lattice.steps();
+        let (start, goal) = (lattice.node(start), lattice.node(goal));
+        nodes[start].cost_so_far = 0.0;
+        open.push(Waiting::new(0.0, estimate(start), start));
+        while let Some(next) = open.pop() {
+            let at = next.node();
+            if at == goal {
                 return;
             }
-            let so_far = self.cost_so_far[node];
-            if waiting(node, so_far).0.0 < next.0.0 {
+            let node = nodes[at];
+            if node.cost_so_far + estimate(at) < next.total() {
                 continue; // a cheaper way to this node came up meanwhile
             }
-            let from = self.costs[node];
+            let from = f64::from(node.cost);
             // Which of the straight neighbours are free decides over the diagonals.
             let mut straight_free = [false; 4];
             for (k, step) in steps.iter().enumerate() {
                 let length = if k < 4 {
                     1.0
                 } else {
-                    let (column, row) = STEPS[k];
-                    let across = straight_free[usize::from(column < 0)];
-                    if !(across && straight_free[2 + usize::from(row < 0)]) {
+                    let [across, along] = BESIDE[k - 4];
+                    if !(straight_free[across] && straight_free[along]) {
                         continue;
                     }
                     SQRT_2
                 };
-                let neighbour = node.wrapping_add_signed(*step);
-                let to = self.costs[neighbour];
+                let neighbour = at.wrapping_add_signed(*step);
+                let to = &mut nodes[neighbour];
                 if k < 4 {
-                    straight_free[k] = to.is_finite();
+                    straight_free[k] = to.cost.is_finite();
                 }
-                let cost = so_far + price(from, to, length);
-                if cost < self.cost_so_far[neighbour] {
-                    self.cost_so_far[neighbour] = cost;
-                    self.reached_by[neighbour] = k as u8;
-                    self.open.push(waiting(neighbour, cost));
+                let cost = node.cost_so_far + model.price(from, f64::from(to.cost), length);
+                if cost < to.cost_so_far {
+                    to.cost_so_far = cost;
+                    to.reached_by = k as u8;
+                    open.push(Waiting::new(cost, estimate(neighbour), neighbour));
                 }
             }
         }
@@ -328,7 +258,8 @@ impl Search {
         let mut cells = vec![end];
         let mut cell = end;
         while cell != start {
-            let (column, row) = STEPS[usize::from(self.reached_by[self.padded(cell)])];
+            let reached_by = self.nodes[self.lattice.node(cell)].reached_by;
+            let (column, row) = STEPS[usize::from(reached_by)];
             cell = (
                 cell.0.wrapping_add_signed(-column),
                 cell.1.wrapping_add_signed(-row),
@@ -336,12 +267,31 @@ impl Search {
             cells.push(cell);
         }
         cells.reverse();
-        let cost = self.cost_so_far[self.padded(end)];
-        let cost = match model {
-            CostModel::LengthMean | CostModel::LengthDest => cost * grid.resolution,
-            CostModel::NodeSum => cost + f64::from(grid.cost(start)),
-        };
-        Path { cells, cost }
+        let cost = self.nodes[self.lattice.node(end)].cost_so_far;
+        Path {
+            cost: told(cost, grid, start, model),
+            cells,
+        }
+    }
+}
+
+/// Whether both ends lie on the grid.
+fn check_inside(grid: &CostGrid, start: Cell, goal: Cell) -> Result<(), PathError> {
+    let outside = |cell: Cell| cell.0 >= grid.width || cell.1 >= grid.height;
+    if outside(start) {
+        return Err(PathError::StartOutside(start));
+    }
+    if outside(goal) {
+        return Err(PathError::GoalOutside(goal));
+    }
+    Ok(())
+}
+
+/// The cost of a path from `start` as [`Path::cost`] tells it, from the sum of its steps in cells.
+fn told(steps: f64, grid: &CostGrid, start: Cell, model: CostModel) -> f64 {
+    match model {
+        CostModel::LengthMean | CostModel::LengthDest => steps * grid.resolution,
+        CostModel::NodeSum => steps + f64::from(grid.cost(start)),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Indoor planning tasks of any size: rooms with doors, people, things to hand over and people to
 //! inform. This file guarantees that the same numbers give the same task everywhere.
 
+use super::chance::Chance;
 use serde_json::json;
 use std::fmt::Write as _;
 
@@ -25,22 +26,9 @@ pub(super) struct Task {
     pub(super) goal: String,
 }
 
-/// Steele and Vigna's mixing of a counter: chance enough for floor plans.
-struct Chance(u64);
-
-impl Chance {
-    fn below(&mut self, end: u32) -> u32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) % u64::from(end.max(1))) as u32
-    }
-}
-
 /// The task of a size: every room has a door to one before it, a third of them to another one, too.
 pub(super) fn task(size: Size) -> Task {
-    let mut chance = Chance(u64::from(size.rooms) << 32 | u64::from(size.people));
+    let mut chance = Chance::new(u64::from(size.rooms) << 32 | u64::from(size.people));
     let mut nodes = vec![json!({"type": "robot", "name": "shelly", "attributes": {}, "id": 1})];
     let mut edges = Vec::new();
     let mut add = |kind: &str, name: String| {

@@ -1,0 +1,112 @@
+//! The grid as a graph: its nodes, steps, their prices and the least that can remain to a goal. This
+//! file guarantees that no step leads off the grid, for a blocked border lies around it.
+
+use super::CostModel;
+use crate::grid::{Cell, CostGrid};
+use std::f64::consts::SQRT_2;
+
+/// Columns and rows of the eight steps: four straight, then four diagonal ones.
+pub(super) const STEPS: [(isize, isize); 8] = [
+    (1, 0),
+    (-1, 0),
+    (0, 1),
+    (0, -1),
+    (1, 1),
+    (-1, 1),
+    (1, -1),
+    (-1, -1),
+];
+
+/// The straight steps on either side of each diagonal one.
+pub(super) const BESIDE: [[usize; 2]; 4] = [[0, 2], [1, 2], [0, 3], [1, 3]];
+
+impl CostModel {
+    /// What a step of `length` cells costs between nodes of these costs.
+    #[inline]
+    pub(super) fn price(self, from: f64, to: f64, length: f64) -> f64 {
+        match self {
+            Self::LengthMean => length * 0.5 * (from + to),
+            Self::LengthDest => length * to,
+            Self::NodeSum => to,
+        }
+    }
+}
+
+/// Node costs with a blocked border around.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Lattice {
+    /// Infinite where nothing may enter.
+    pub(super) costs: Vec<f32>,
+    stride: usize,
+    /// The least cost, and the greatest that is finite.
+    pub(super) least: f32,
+    pub(super) greatest: f32,
+}
+
+/// NaN and negative costs have no meaning: such a cell is not entered.
+pub(super) fn node_cost(cost: f32) -> f32 {
+    if cost >= 0.0 { cost } else { f32::INFINITY }
+}
+
+impl Lattice {
+    pub(super) fn load(&mut self, grid: &CostGrid) {
+        self.stride = grid.width + 2;
+        self.costs.clear();
+        self.costs
+            .resize(self.stride * (grid.height + 2), f32::INFINITY);
+        (self.least, self.greatest) = (f32::INFINITY, 0.0);
+        for row in 0..grid.height {
+            let from = &grid.costs[row * grid.width..(row + 1) * grid.width];
+            let into = &mut self.costs[(row + 1) * self.stride + 1..][..grid.width];
+            for (into, &cost) in into.iter_mut().zip(from) {
+                *into = node_cost(cost);
+                self.least = self.least.min(*into);
+                if into.is_finite() {
+                    self.greatest = self.greatest.max(*into);
+                }
+            }
+        }
+    }
+
+    /// Whether a grid has the size of the one that was loaded.
+    pub(super) fn fits(&self, grid: &CostGrid) -> bool {
+        self.stride == grid.width + 2 && self.costs.len() == self.stride * (grid.height + 2)
+    }
+
+    /// The node of a cell.
+    pub(super) fn node(&self, cell: Cell) -> usize {
+        (cell.1 + 1) * self.stride + cell.0 + 1
+    }
+
+    /// The cell of a node that is not of the border.
+    pub(super) fn cell(&self, node: usize) -> Cell {
+        (node % self.stride - 1, node / self.stride - 1)
+    }
+
+    /// How far on each step leads among the nodes.
+    pub(super) fn steps(&self) -> [isize; 8] {
+        let stride = self.stride.cast_signed();
+        STEPS.map(|(column, row)| row * stride + column)
+    }
+
+    /// The least that a way between a node and `goal` can cost under `model`: the octile distance
+    /// at the least cost of the grid. No step changes it by more than the step costs.
+    pub(super) fn estimate_to(
+        &self,
+        goal: Cell,
+        model: CostModel,
+    ) -> impl Fn(usize) -> f64 + use<> {
+        let (stride, least) = (self.stride, f64::from(self.least));
+        let (x, y) = (goal.0 + 1, goal.1 + 1);
+        // Under NodeSum a diagonal step costs no more than a straight one.
+        let diagonal = match model {
+            CostModel::NodeSum => 1.0,
+            CostModel::LengthMean | CostModel::LengthDest => SQRT_2,
+        } - 1.0;
+        move |node| {
+            let across = (node % stride).abs_diff(x) as f64;
+            let along = (node / stride).abs_diff(y) as f64;
+            least * (across.max(along) + diagonal * across.min(along))
+        }
+    }
+}
