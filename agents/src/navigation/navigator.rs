@@ -3,8 +3,9 @@
 //! that a task ends: it is reached, or it fails with a reason.
 //!
 //! It plans anew when the task or the person it leads to has moved, when the path became blocked or
-//! noticeably dearer, when the band broke, and when the robot makes no headway. Among people who
-//! walk it also asks once a second whether a clearly cheaper way has opened. Never every step.
+//! noticeably dearer, when the band broke, and when the robot makes no headway. Where the costs of the
+//! map have changed (somebody moved, an activity began or ended, a door opened) it asks once a second
+//! whether a clearly cheaper way has opened. On a map that stays as it is, it plans once.
 
 mod course;
 mod drive;
@@ -40,7 +41,7 @@ pub struct Config {
     pub heading_tolerance: f64,
     /// Readings older than this are worth nothing, seconds.
     pub patience: f64,
-    /// How often to ask for a better way among people who walk, seconds.
+    /// How often to look whether the map has changed in favour of another way, seconds.
     pub review: f64,
     /// Without headway for so long the robot tries something else, seconds.
     pub recover_after: f64,
@@ -190,7 +191,7 @@ impl Navigator {
         self.band.points()
     }
 
-    /// How often a path has been planned.
+    /// How often a path has been planned and taken.
     pub fn plans(&self) -> u64 {
         self.plans
     }

@@ -49,9 +49,12 @@ pub struct Request {
     pub model: CostModel,
     /// The order of the search.
     pub algorithm: Algorithm,
-    /// A blocked start gives way to the nearest free cell, and a blocked or unreachable goal to the
-    /// nearest reachable cell, up to this many metres away; 0 allows neither.
-    pub tolerance: f64,
+    /// A blocked start gives way to the nearest free cell from which there is a way, up to this many
+    /// metres away.
+    pub start_tolerance: f64,
+    /// A blocked or unreachable goal gives way to the nearest reachable cell, up to this many metres
+    /// away.
+    pub goal_tolerance: f64,
 }
 
 impl Request {
@@ -62,7 +65,8 @@ impl Request {
             goal,
             model: CostModel::default(),
             algorithm: Algorithm::default(),
-            tolerance: 0.0,
+            start_tolerance: 0.0,
+            goal_tolerance: 0.0,
         }
     }
 }
@@ -143,13 +147,21 @@ impl Search {
         let &Request {
             start,
             goal,
-            tolerance,
+            start_tolerance,
+            goal_tolerance: tolerance,
             ..
         } = request;
         check_inside(grid, start, goal)?;
-        let starts = free_cells_near(grid, start, if free(grid, start) { 0.0 } else { tolerance });
+        let starts = if free(grid, start) {
+            vec![start]
+        } else {
+            free_cells_near(grid, start, start_tolerance)
+        };
         if starts.is_empty() {
-            return Err(PathError::StartBlocked { start, tolerance });
+            return Err(PathError::StartBlocked {
+                start,
+                tolerance: start_tolerance,
+            });
         }
         let goals = free_cells_near(grid, goal, tolerance);
         let Some(&nearest_goal) = goals.first() else {

@@ -1,8 +1,9 @@
 //! The global path as the navigator uses it: from the robot to a place, on the social grid and on
-//! what the robot knows beyond it. This file guarantees that the caller's grid is left alone.
+//! what the robot knows beyond it. This file guarantees that the caller's grid is left alone, and
+//! that as long as the goal stays, only what changed on the grid is searched again.
 
 use super::obstacles::Obstacles;
-use super::path::{PathError, Request, Search};
+use super::path::{CostModel, Path, PathError, Replanner, Request, Search, free_cells_near};
 use super::people::{INTIMATE, PERSONAL, Person, Presence};
 use super::target::Destination;
 use crate::grid::{BLOCKED, Cell, CostGrid};
@@ -27,6 +28,8 @@ const START_TOLERANCE: f64 = 1.0;
 pub(super) struct Planner {
     search: Search,
     grid: CostGrid,
+    /// Of the goal asked for last.
+    replanner: Option<Replanner>,
 }
 
 impl Default for Planner {
@@ -34,6 +37,7 @@ impl Default for Planner {
         Self {
             search: Search::default(),
             grid: CostGrid::covering([0.0; 4], 1.0),
+            replanner: None,
         }
     }
 }
@@ -144,21 +148,7 @@ impl Planner {
             .grid
             .cell_at(destination.point)
             .ok_or(PathError::GoalOutside(outside))?;
-        let start = if self.grid.cost(start) < BLOCKED {
-            start
-        } else {
-            let near = super::path::free_cells_near(&self.grid, start, START_TOLERANCE);
-            let error = PathError::StartBlocked {
-                start,
-                tolerance: START_TOLERANCE,
-            };
-            *near.first().ok_or(error)?
-        };
-        let request = Request {
-            tolerance,
-            ..Request::new(start, goal)
-        };
-        let path = self.search.find(&self.grid, &request)?;
+        let path = self.path(start, goal, tolerance)?;
         let mut line = vec![robot];
         line.extend(
             path.cells
@@ -175,6 +165,39 @@ impl Planner {
             line.push(self.grid.centre(path.cells[0]));
         }
         Ok(line)
+    }
+
+    /// Whether anything that was loaded since the last path could make it another one.
+    pub(super) fn has_news(&self) -> bool {
+        let known = self.replanner.as_ref();
+        known.is_none_or(|replanner| replanner.differs(&self.grid))
+    }
+
+    /// The cheapest path, by the planner that is kept for the goal; where an end has to give way to
+    /// another than the nearest free cell, by a search that looks at all of them.
+    fn path(&mut self, start: Cell, goal: Cell, goal_tolerance: f64) -> Result<Path, PathError> {
+        let end = free_cells_near(&self.grid, goal, goal_tolerance);
+        if let (true, Some(&end)) = (self.grid.cost(start) < BLOCKED, end.first()) {
+            let kept = self.replanner.take().filter(|kept| kept.goal() == end);
+            let mut replanner = match kept {
+                Some(mut kept) => {
+                    kept.observe(&self.grid);
+                    kept
+                }
+                None => Replanner::new(&self.grid, end, CostModel::default())?,
+            };
+            let found = replanner.find(&self.grid, start);
+            self.replanner = Some(replanner);
+            if !matches!(found, Err(PathError::Unreachable { .. })) {
+                return found;
+            }
+        }
+        let request = Request {
+            start_tolerance: START_TOLERANCE,
+            goal_tolerance,
+            ..Request::new(start, goal)
+        };
+        self.search.find(&self.grid, &request)
     }
 
     /// What `line` meets on the grid as it is loaded.

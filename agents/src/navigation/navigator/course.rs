@@ -17,6 +17,8 @@ pub(super) struct Course {
     /// Where the person stood for whom the destination was chosen.
     pub(super) person: Point2<f64>,
     pub(super) planned: Option<Time>,
+    /// When it was last asked whether the map has news.
+    pub(super) reviewed: Option<Time>,
     /// The least price that the band has had since it was planned.
     pub(super) price: f64,
     /// The way that was left at the last step, metres.
@@ -79,6 +81,7 @@ impl Course {
             destination: None,
             person: Point2::origin(),
             planned: None,
+            reviewed: None,
             price: f64::INFINITY,
             left: f64::INFINITY,
             shortest: f64::INFINITY,

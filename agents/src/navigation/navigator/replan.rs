@@ -42,9 +42,13 @@ impl Navigator {
         if self.band.points().is_empty() || moved || dearer || course.hindrance.is_some() {
             return self.plan(course, grid, view, person, Care::Map);
         }
-        let walkers = view.inputs.people.iter().any(Person::is_walking);
-        if view.inputs.social && walkers && age >= self.config.review {
-            self.review(course, grid, view, person);
+        let reviewed = course.reviewed.max(course.planned);
+        if reviewed.is_none_or(|then| view.now.since(then) >= self.config.review) {
+            course.reviewed = Some(view.now);
+            self.load(grid, view, Care::Map);
+            if self.planner.has_news() {
+                self.review(course, grid, view, person);
+            }
         }
         Ok(())
     }
@@ -58,30 +62,18 @@ impl Navigator {
         person: Option<&Person>,
     ) {
         let old = std::mem::take(&mut self.band);
-        let kept = course.clone();
+        let (kept, plans) = (course.clone(), self.plans);
         let found = self.plan(course, grid, view, person, Care::Map);
         let new = self.planner.price(self.band.points());
         let before = self.planner.price(old.points());
         if found.is_err() || !before.blocked && new.cost > 0.85 * before.cost {
-            self.band = old;
-            *course = Course {
-                planned: Some(view.now),
-                ..kept
-            };
+            (self.band, self.plans) = (old, plans);
+            *course = kept;
         }
     }
 
-    /// Plans a path and lays a band along it.
-    pub(super) fn plan(
-        &mut self,
-        course: &mut Course,
-        grid: &CostGrid,
-        view: &View,
-        person: Option<&Person>,
-        care: Care,
-    ) -> Result<(), Hindrance> {
-        self.plans += 1;
-        course.planned = Some(view.now);
+    /// Loads the planner with what a path is to take account of.
+    fn load(&mut self, grid: &CostGrid, view: &View, care: Care) {
         let robot = view.robot.position;
         self.planner.load(grid);
         if view.inputs.social {
@@ -99,6 +91,21 @@ impl Navigator {
             let reach = (view.inputs.limits.radius, 4.0);
             self.planner.block(&self.obstacles, &standing, robot, reach);
         }
+    }
+
+    /// Plans a path and lays a band along it.
+    pub(super) fn plan(
+        &mut self,
+        course: &mut Course,
+        grid: &CostGrid,
+        view: &View,
+        person: Option<&Person>,
+        care: Care,
+    ) -> Result<(), Hindrance> {
+        self.plans += 1;
+        course.planned = Some(view.now);
+        let robot = view.robot.position;
+        self.load(grid, view, care);
         let found = self.line(course, grid, robot, person);
         course.hindrance = found.as_ref().err().copied();
         let (destination, line) = found?;

@@ -214,6 +214,82 @@ fn a_path_that_the_grid_closes_is_planned_anew() {
 }
 
 #[test]
+fn a_door_that_opens_on_the_way_is_taken_and_a_change_elsewhere_is_not_heeded() {
+    let mut hall = Hall::new();
+    hall.walls.push(wall(4.0, 0.0, 4.0, 2.5));
+    hall.walls.push(wall(4.0, 3.5, 4.0, 5.0));
+    let without_door = hall.walls.clone();
+    hall.walls.push(wall(4.0, 2.5, 4.0, 3.5));
+    hall.block_walls();
+    let task = point(6.5, 3.0);
+    for _ in 0..5 {
+        hall.step(Some(&task));
+    }
+    let highest = |hall: &Hall| {
+        let path = hall.navigator.path().iter();
+        path.map(|place| place.y).fold(0.0, f64::max)
+    };
+    assert!(highest(&hall) > 5.0, "the door is shut");
+    // Something is put into a corner.
+    hall.grid.costs[5 * 80 + 75] = BLOCKED;
+    for _ in 0..12 {
+        hall.step(Some(&task));
+    }
+    assert_eq!(hall.navigator.plans(), 1);
+    hall.walls = without_door;
+    hall.grid = CostGrid::covering([0.0, 0.0, 8.0, 6.0], 0.1);
+    hall.block_walls();
+    for _ in 0..15 {
+        hall.step(Some(&task));
+    }
+    assert!(highest(&hall) < 4.5, "{}", highest(&hall));
+    assert_eq!(hall.run(&task, 30.0).0, Status::Arrived);
+    assert_eq!(hall.navigator.plans(), 2);
+}
+
+#[test]
+fn an_activity_that_begins_on_the_way_is_driven_round() {
+    let mut hall = Hall::new();
+    let task = point(6.5, 3.0);
+    for _ in 0..5 {
+        hall.step(Some(&task));
+    }
+    // The space before an object in use (READING.md item 7).
+    for k in 0..hall.grid.costs.len() {
+        let place = hall.grid.centre((k % hall.grid.width, k / hall.grid.width));
+        if (3.0..5.0).contains(&place.x) && (0.0..3.6).contains(&place.y) {
+            hall.grid.costs[k] = hall.grid.costs[k].max(3.5);
+        }
+    }
+    let mut lowest = f64::INFINITY;
+    while hall.step(Some(&task)).status == Status::Moving {
+        if (3.2..4.8).contains(&hall.robot.position.x) {
+            lowest = lowest.min(hall.robot.position.y);
+        }
+    }
+    assert!(lowest > 3.2, "{lowest}");
+    assert_eq!(hall.navigator.plans(), 2);
+}
+
+#[test]
+fn where_start_or_goal_are_blocked_the_nearest_places_that_can_be_reached_serve() {
+    let mut hall = Hall::new();
+    let disc = |hall: &mut Hall, x: f64, y: f64| {
+        for k in 0..hall.grid.costs.len() {
+            let cell = (k % hall.grid.width, k / hall.grid.width);
+            if distance(&hall.grid.centre(cell), &Point2::new(x, y)) < 0.5 {
+                hall.grid.costs[k] = BLOCKED;
+            }
+        }
+    };
+    disc(&mut hall, 1.0, 3.0);
+    disc(&mut hall, 6.5, 3.0);
+    assert_eq!(hall.run(&point(6.5, 3.0), 30.0).0, Status::Arrived);
+    let gap = distance(&hall.robot.position, &Point2::new(6.5, 3.0));
+    assert!(gap < 0.8, "{gap}");
+}
+
+#[test]
 fn what_only_the_laser_sees_is_driven_round() {
     let mut hall = Hall::new();
     hall.unknown.push(wall(4.0, 0.0, 4.0, 4.2));

@@ -73,6 +73,26 @@ impl Lattice {
         self.stride == grid.width + 2 && self.costs.len() == self.stride * (grid.height + 2)
     }
 
+    /// The cells of which `grid` says another cost; all of them where it has another size.
+    pub(super) fn changed<'a>(&'a self, grid: &'a CostGrid) -> impl Iterator<Item = Cell> + 'a {
+        let fits = self.fits(grid);
+        (0..grid.height).flat_map(move |row| {
+            let new = &grid.costs[row * grid.width..(row + 1) * grid.width];
+            let old = if fits {
+                &self.costs[(row + 1) * self.stride + 1..][..grid.width]
+            } else {
+                &[]
+            };
+            let differs = move |column: usize| {
+                let known = old.get(column);
+                known.is_none_or(|old| old.to_bits() != node_cost(new[column]).to_bits())
+            };
+            (0..grid.width)
+                .filter(move |&column| differs(column))
+                .map(move |column| (column, row))
+        })
+    }
+
     /// The node of a cell.
     pub(super) fn node(&self, cell: Cell) -> usize {
         (cell.1 + 1) * self.stride + cell.0 + 1

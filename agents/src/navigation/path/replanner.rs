@@ -18,6 +18,9 @@ struct Node {
     follows: f64,
 }
 
+/// Where more than one of so many cells changed, beginning anew is quicker than mending.
+const TOO_MANY: usize = 8;
+
 /// Sums of the same steps in another order differ by less than this part.
 const SAME: f64 = 1e-9;
 
@@ -107,6 +110,29 @@ impl Replanner {
     /// How many nodes were looked at so far.
     pub fn expanded(&self) -> u64 {
         self.expanded
+    }
+
+    /// The cell that it plans to.
+    pub fn goal(&self) -> Cell {
+        self.goal
+    }
+
+    /// Whether `grid` says anything of a cell that this planner does not know yet.
+    pub fn differs(&self, grid: &CostGrid) -> bool {
+        self.lattice.changed(grid).next().is_some()
+    }
+
+    /// Takes over all that `grid` says, whatever its size. The goal must lie on it.
+    pub fn observe(&mut self, grid: &CostGrid) {
+        if !self.lattice.fits(grid) {
+            return self.begin(grid);
+        }
+        let changed: Vec<Cell> = self.lattice.changed(grid).collect();
+        if changed.len() * TOO_MANY > grid.costs.len() {
+            self.begin(grid);
+        } else {
+            self.update(grid, changed);
+        }
     }
 
     /// Takes over what `grid` says of the cells that were `changed`; those outside are passed over.

@@ -30,7 +30,8 @@ fn find(grid: &CostGrid, start: Cell, goal: Cell, tolerance: f64) -> Result<Path
     Search::default().find(
         grid,
         &Request {
-            tolerance,
+            start_tolerance: tolerance,
+            goal_tolerance: tolerance,
             ..Request::new(start, goal)
         },
     )

@@ -31,6 +31,7 @@ proptest! {
             Just(CostModel::LengthMean), Just(CostModel::LengthDest), Just(CostModel::NodeSum),
         ],
         events in events(),
+        told in any::<bool>(),
     ) {
         let mut grid = CostGrid::covering([0.0, 0.0, width as f64 * 0.5, height as f64 * 0.5], 0.5);
         grid.costs.copy_from_slice(&cells[..width * height]);
@@ -47,7 +48,12 @@ proptest! {
                 grid.costs[cell.1 * width + cell.0] = cost;
                 cell
             }).collect();
-            planner.update(&grid, changed);
+            if told {
+                planner.update(&grid, changed);
+            } else {
+                planner.observe(&grid);
+            }
+            prop_assert!(!planner.differs(&grid));
             let start = cell(start);
             let request = Request { model, ..Request::new(start, goal) };
             let expected = Search::default().find(&grid, &request);
