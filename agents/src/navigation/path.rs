@@ -4,6 +4,7 @@
 //! The graph is 8-connected; a diagonal step needs both orthogonal neighbours free (READING.md
 //! item 8), so a path never cuts the corner of an obstacle.
 
+mod canonical;
 mod lattice;
 mod queue;
 mod replanner;
@@ -11,9 +12,10 @@ mod replanner;
 pub use replanner::Replanner;
 
 use crate::grid::{BLOCKED, Cell, CostGrid};
-use lattice::{BESIDE, Lattice, STEPS};
-use queue::{Queue, Waiting};
+use lattice::{Lattice, STEPS};
+use queue::{Buckets, Queue, Sorted, Waiting};
 use std::f64::consts::SQRT_2;
+use std::mem::take;
 use thiserror::Error;
 
 /// What one step from a node to its neighbour costs (READING.md item 8).
@@ -121,18 +123,12 @@ pub enum PathError {
 #[derive(Debug, Clone, Default)]
 pub struct Search {
     lattice: Lattice,
-    nodes: Vec<Node>,
-    open: Queue,
-}
-
-/// What the search knows of a node.
-#[derive(Debug, Clone, Copy)]
-struct Node {
-    cost_so_far: f64,
-    /// As in the lattice: beside the cost so far, so that looking at a neighbour is one look.
-    cost: f32,
-    /// The direction, an index of [`STEPS`], by which the node was reached.
-    reached_by: u8,
+    /// Of each node, infinite where it was not reached.
+    cost_so_far: Vec<f64>,
+    /// The direction, an index of [`STEPS`], in which a node was reached, where it was.
+    reached_by: Vec<u8>,
+    buckets: Buckets,
+    sorted: Sorted,
 }
 
 impl Search {
@@ -142,7 +138,8 @@ impl Search {
     /// [`PathError`] where an end lies outside the grid or no allowed path exists.
     ///
     /// # Complexity
-    /// O(n log n) for n cells; no allocation beyond the path once the buffers have grown.
+    /// O(n) for n cells whose costs differ by less than four powers of ten, else O(n log n); no
+    /// allocation beyond the path once the buffers have grown.
     pub fn find(&mut self, grid: &CostGrid, request: &Request) -> Result<Path, PathError> {
         let &Request {
             start,
@@ -191,76 +188,120 @@ impl Search {
     }
 
     fn reached(&self, cell: Cell) -> bool {
-        self.nodes[self.lattice.node(cell)].cost_so_far.is_finite()
+        self.cost_so_far[self.lattice.node(cell)].is_finite()
     }
 
     /// Searches from `start` until `goal` is settled or nothing is left.
     fn expand(&mut self, start: Cell, goal: Cell, request: &Request) {
-        match request.algorithm {
-            Algorithm::Dijkstra => self.search(start, goal, request.model, |_| 0.0),
-            Algorithm::AStar => {
-                let estimate = self.lattice.estimate_to(goal, request.model);
-                self.search(start, goal, request.model, estimate);
+        // Each model has a loop of its own, which asks for no model.
+        match request.model {
+            CostModel::LengthMean => {
+                self.order(start, goal, request, |from, to, length| {
+                    CostModel::LengthMean.price(from, to, length)
+                });
+            }
+            CostModel::LengthDest => {
+                self.order(start, goal, request, |from, to, length| {
+                    CostModel::LengthDest.price(from, to, length)
+                });
+            }
+            CostModel::NodeSum => {
+                self.order(start, goal, request, |from, to, length| {
+                    CostModel::NodeSum.price(from, to, length)
+                });
             }
         }
     }
 
-    fn search(
+    fn order(
         &mut self,
         start: Cell,
         goal: Cell,
-        model: CostModel,
+        request: &Request,
+        price: impl Fn(f64, f64, f64) -> f64,
+    ) {
+        let (start, end) = (self.lattice.node(start), self.lattice.node(goal));
+        // Under NodeSum a diagonal step costs no more than a straight one: another order of ways.
+        let prunes = request.model != CostModel::NodeSum;
+        let ends = (start, end, prunes);
+        let estimate = self.lattice.estimate_to(goal, request.model);
+        // No step raises a total by more than its own price and what it may lead away; and none costs
+        // less than the least cost, so that within such a width no order is needed.
+        let span = 2.0 * SQRT_2 * f64::from(self.lattice.greatest);
+        let width = f64::from(self.lattice.least);
+        let (mut buckets, mut sorted) = (take(&mut self.buckets), take(&mut self.sorted));
+        match request.algorithm {
+            Algorithm::Dijkstra if buckets.clear(span, width) => {
+                self.search(ends, price, |_| 0.0, &mut buckets);
+            }
+            Algorithm::AStar if buckets.clear(span, 0.5 * width) => {
+                self.search(ends, price, estimate, &mut buckets);
+            }
+            Algorithm::Dijkstra => {
+                sorted.clear();
+                self.search(ends, price, |_| 0.0, &mut sorted);
+            }
+            Algorithm::AStar => {
+                sorted.clear();
+                self.search(ends, price, estimate, &mut sorted);
+            }
+        }
+        (self.buckets, self.sorted) = (buckets, sorted);
+    }
+
+    fn search(
+        &mut self,
+        (start, goal, prunes): (usize, usize, bool),
+        price: impl Fn(f64, f64, f64) -> f64,
         estimate: impl Fn(usize) -> f64,
+        open: &mut impl Queue,
     ) {
         let Self {
             lattice,
-            nodes,
-            open,
+            cost_so_far,
+            reached_by,
+            ..
         } = self;
-        nodes.clear();
-        nodes.extend(lattice.costs.iter().map(|&cost| Node {
-            cost_so_far: f64::INFINITY,
-            cost,
-            reached_by: u8::MAX,
-        }));
-        // No step raises a total estimate by more than its own price and what it may lead away.
-        open.clear(2.0 * SQRT_2 * f64::from(lattice.greatest));
+        cost_so_far.clear();
+        cost_so_far.resize(lattice.costs.len(), f64::INFINITY);
+        reached_by.resize(lattice.costs.len(), canonical::START);
         let steps = lattice.steps();
-        let (start, goal) = (lattice.node(start), lattice.node(goal));
-        nodes[start].cost_so_far = 0.0;
-        open.push(Waiting::new(0.0, estimate(start), start));
+        let offers = canonical::offers();
+        cost_so_far[start] = 0.0;
+        reached_by[start] = canonical::START;
+        open.push(estimate(start), Waiting::new(0.0, start));
         while let Some(next) = open.pop() {
-            let at = next.node();
-            if at == goal {
-                return;
-            }
-            let node = nodes[at];
-            if node.cost_so_far + estimate(at) < next.total() {
+            let at = next.node as usize;
+            let so_far = cost_so_far[at];
+            if so_far < next.cost {
                 continue; // a cheaper way to this node came up meanwhile
             }
-            let from = f64::from(node.cost);
-            // Which of the straight neighbours are free decides over the diagonals.
-            let mut straight_free = [false; 4];
-            for (k, step) in steps.iter().enumerate() {
-                let length = if k < 4 {
-                    1.0
-                } else {
-                    let [across, along] = BESIDE[k - 4];
-                    if !(straight_free[across] && straight_free[along]) {
-                        continue;
+            if open.is_past(cost_so_far[goal]) {
+                return;
+            }
+            let from = f64::from(lattice.costs[at]);
+            let (free, uniform) = lattice.around(at);
+            let came = if uniform && prunes {
+                reached_by[at]
+            } else {
+                canonical::START
+            };
+            let mut offered = offers[usize::from(came)][usize::from(free)];
+            while offered != 0 {
+                let k = offered.trailing_zeros() as usize;
+                offered &= offered - 1;
+                let neighbour = at.wrapping_add_signed(steps[k]);
+                let length = if k < 4 { 1.0 } else { SQRT_2 };
+                let to = f64::from(lattice.costs[neighbour]);
+                let cost = so_far + price(from, to, length);
+                if cost < cost_so_far[neighbour] {
+                    cost_so_far[neighbour] = cost;
+                    reached_by[neighbour] = k as u8;
+                    // What cannot make the way to the goal cheaper need not wait.
+                    let total = cost + estimate(neighbour);
+                    if total < cost_so_far[goal] {
+                        open.push(total, Waiting::new(cost, neighbour));
                     }
-                    SQRT_2
-                };
-                let neighbour = at.wrapping_add_signed(*step);
-                let to = &mut nodes[neighbour];
-                if k < 4 {
-                    straight_free[k] = to.cost.is_finite();
-                }
-                let cost = node.cost_so_far + model.price(from, f64::from(to.cost), length);
-                if cost < to.cost_so_far {
-                    to.cost_so_far = cost;
-                    to.reached_by = k as u8;
-                    open.push(Waiting::new(cost, estimate(neighbour), neighbour));
                 }
             }
         }
@@ -270,7 +311,7 @@ impl Search {
         let mut cells = vec![end];
         let mut cell = end;
         while cell != start {
-            let reached_by = self.nodes[self.lattice.node(cell)].reached_by;
+            let reached_by = self.reached_by[self.lattice.node(cell)];
             let (column, row) = STEPS[usize::from(reached_by)];
             cell = (
                 cell.0.wrapping_add_signed(-column),
@@ -279,7 +320,7 @@ impl Search {
             cells.push(cell);
         }
         cells.reverse();
-        let cost = self.nodes[self.lattice.node(end)].cost_so_far;
+        let cost = self.cost_so_far[self.lattice.node(end)];
         Path {
             cost: told(cost, grid, start, model),
             cells,

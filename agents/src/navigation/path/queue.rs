@@ -1,109 +1,144 @@
-//! Nodes that wait to be looked at, cheapest first. This file guarantees the order of a binary heap,
-//! at a cost that hardly grows with how many wait: only the cheapest few lie in a heap, the others
-//! in buckets by their estimate, unsorted until their turn.
+//! Nodes that wait to be looked at, those of the least totals first. This file guarantees that a node
+//! comes before all whose totals are greater by a width: none in [`Sorted`], that of a bucket in
+//! [`Buckets`], where the newest in a bucket comes first, so that the search goes on where it is.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// Into how many buckets the span of the waiting nodes is cut.
-const BUCKETS: usize = 512;
+/// No more buckets than this.
+const MOST: usize = 1 << 16;
 
-/// A node that waits. Of equal totals the node nearer to the goal goes first, then the lower one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+/// Waiting nodes in some order.
+pub(super) trait Queue {
+    /// Takes a node whose cost and estimate add up to `total`.
+    fn push(&mut self, total: f64, waiting: Waiting);
+    /// The next one.
+    fn pop(&mut self) -> Option<Waiting>;
+    /// Whether all with this total have come.
+    fn is_past(&self, total: f64) -> bool;
+}
+
+/// A node that waits.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Waiting {
-    /// Bits of floats that are not negative order like the floats.
-    total: u64,
-    estimate: u32,
-    node: u32,
+    /// What it was reached for.
+    pub(super) cost: f64,
+    pub(super) node: u32,
 }
 
 impl Waiting {
-    /// A node reached for `cost`, with an `estimate` of what remains to the goal.
-    pub(super) fn new(cost: f64, estimate: f64, node: usize) -> Self {
+    pub(super) fn new(cost: f64, node: usize) -> Self {
         Self {
-            total: (cost + estimate).to_bits(),
-            estimate: (estimate as f32).to_bits(),
+            cost,
             node: node as u32,
         }
     }
-
-    pub(super) fn node(self) -> usize {
-        self.node as usize
-    }
-
-    /// Cost so far and estimate.
-    pub(super) fn total(self) -> f64 {
-        f64::from_bits(self.total)
-    }
 }
 
-/// The waiting nodes.
+/// The waiting nodes, in a ring of buckets.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Queue {
-    /// Those of the bucket whose turn it is, and of the ones before.
-    soon: BinaryHeap<Reverse<Waiting>>,
-    /// Those of the [`BUCKETS`] buckets after it, in a ring.
-    later: Vec<Vec<Reverse<Waiting>>>,
-    /// How many wait in `later`.
+pub(super) struct Buckets {
+    /// A power of two of them.
+    ring: Vec<Vec<Waiting>>,
+    /// The newest of the bucket whose turn it is, if it has come since the last one went.
+    newest: Option<Waiting>,
     count: usize,
-    /// Whose turn it is.
-    turn: usize,
-    buckets_per_cost: f64,
+    /// The bucket whose turn it is, counted from total 0.
+    turn: u64,
+    per_cost: f64,
 }
 
-impl Queue {
-    /// Forgets all, for a search in which a node is pushed at most `span` above the one popped before.
-    pub(super) fn clear(&mut self, span: f64) {
-        self.soon.clear();
-        self.later.iter_mut().for_each(Vec::clear);
-        self.later.resize(BUCKETS, Vec::new());
-        (self.count, self.turn) = (0, 0);
-        let per_cost = (BUCKETS - 2) as f64 / span;
-        // Where all is free of charge there is one bucket.
-        self.buckets_per_cost = if per_cost.is_finite() { per_cost } else { 0.0 };
-    }
-
-    fn bucket_of(&self, waiting: Waiting) -> usize {
-        (waiting.total() * self.buckets_per_cost) as usize
-    }
-
-    pub(super) fn push(&mut self, waiting: Waiting) {
-        let bucket = self.bucket_of(waiting);
-        // What is too far away for the ring is in nobody's way in the heap.
-        if bucket <= self.turn || bucket - self.turn >= BUCKETS {
-            self.soon.push(Reverse(waiting));
-        } else {
-            self.later[bucket % BUCKETS].push(Reverse(waiting));
-            self.count += 1;
+impl Buckets {
+    /// Forgets all, for a search in which a node is pushed at most `span` above the one popped before,
+    /// and makes buckets about `width` wide, if no more than a sensible number of them are needed.
+    pub(super) fn clear(&mut self, span: f64, width: f64) -> bool {
+        let buckets = span / width;
+        let sensible = buckets < (MOST - 3) as f64;
+        if sensible {
+            self.ring.iter_mut().for_each(Vec::clear);
+            let buckets = (buckets as usize + 3).next_power_of_two();
+            self.ring.resize(buckets, Vec::new());
+            (self.count, self.turn, self.newest) = (0, 0, None);
+            self.per_cost = (buckets - 3) as f64 / span;
         }
+        sensible
     }
 
-    pub(super) fn pop(&mut self) -> Option<Waiting> {
-        loop {
-            // The turn of a node in the heap may be yet to come.
-            if let Some(Reverse(next)) = self.soon.peek() {
-                let bucket = self.bucket_of(*next);
-                if self.count == 0 {
-                    self.turn = self.turn.max(bucket);
-                }
-                if bucket <= self.turn {
-                    return self.soon.pop().map(|Reverse(next)| next);
-                }
+    fn bucket_of(&self, total: f64) -> u64 {
+        (total * self.per_cost) as u64
+    }
+}
+
+impl Queue for Buckets {
+    fn push(&mut self, total: f64, waiting: Waiting) {
+        let bucket = self.bucket_of(total);
+        // Whose turn is over by a rounding comes at once, too.
+        let (bucket, waiting) = if bucket <= self.turn {
+            match self.newest.replace(waiting) {
+                Some(before) => (self.turn, before),
+                None => return,
             }
-            if self.count == 0 {
-                return None;
+        } else {
+            (bucket, waiting)
+        };
+        let mask = self.ring.len() - 1;
+        self.ring[bucket as usize & mask].push(waiting);
+        self.count += 1;
+    }
+
+    fn pop(&mut self) -> Option<Waiting> {
+        if self.newest.is_some() {
+            return self.newest.take();
+        }
+        if self.count == 0 {
+            return None;
+        }
+        let mask = self.ring.len() - 1;
+        loop {
+            if let Some(next) = self.ring[self.turn as usize & mask].pop() {
+                self.count -= 1;
+                return Some(next);
             }
             self.turn += 1;
-            let bucket = &mut self.later[self.turn % BUCKETS];
-            self.count -= bucket.len();
-            if self.soon.is_empty() && !bucket.is_empty() {
-                let mut empty = std::mem::take(&mut self.soon).into_vec();
-                std::mem::swap(&mut empty, bucket);
-                self.soon = BinaryHeap::from(empty);
-            } else {
-                self.soon.extend(bucket.drain(..));
-            }
         }
+    }
+
+    fn is_past(&self, total: f64) -> bool {
+        self.bucket_of(total) < self.turn
+    }
+}
+
+/// The waiting nodes in a heap, for costs that lie too far apart for buckets.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Sorted {
+    /// Totals, costs and nodes: bits of floats that are not negative order like the floats.
+    heap: BinaryHeap<Reverse<(u64, u64, u32)>>,
+    last: u64,
+}
+
+impl Sorted {
+    /// Forgets all.
+    pub(super) fn clear(&mut self) {
+        self.heap.clear();
+        self.last = 0;
+    }
+}
+
+impl Queue for Sorted {
+    fn push(&mut self, total: f64, waiting: Waiting) {
+        let entry = (total.to_bits(), waiting.cost.to_bits(), waiting.node);
+        self.heap.push(Reverse(entry));
+    }
+
+    fn pop(&mut self) -> Option<Waiting> {
+        let Reverse((total, cost, node)) = self.heap.pop()?;
+        self.last = total;
+        let cost = f64::from_bits(cost);
+        Some(Waiting { cost, node })
+    }
+
+    fn is_past(&self, total: f64) -> bool {
+        total.to_bits() < self.last
     }
 }
 
@@ -114,30 +149,45 @@ mod tests {
 
     proptest! {
         #[test]
-        fn it_gives_the_order_of_a_heap(
-            span in prop_oneof![Just(0.0), 0.1..100.0f64],
-            steps in proptest::collection::vec((any::<bool>(), 0.0..2.0f64, 0.0..3.0f64), 0..400),
+        fn all_come_out_and_none_before_its_turn(
+            span in 0.1..100.0f64,
+            share in 0.001..3.0f64,
+            steps in proptest::collection::vec((any::<bool>(), 0.0..1.0f64), 0..400),
         ) {
-            let mut queue = Queue::default();
-            queue.clear(span);
-            let mut heap = BinaryHeap::new();
-            let mut last = 0.0;
-            for (node, (push, ahead, estimate)) in steps.into_iter().enumerate() {
-                if push {
-                    // Also beyond the span.
-                    let waiting = Waiting::new(last + ahead * span, estimate, node);
-                    queue.push(waiting);
-                    heap.push(Reverse(waiting));
-                } else {
-                    let expected = heap.pop().map(|Reverse(waiting)| waiting);
-                    last = expected.map_or(last, |waiting| waiting.total());
-                    prop_assert_eq!(queue.pop(), expected);
-                }
-            }
-            while let Some(Reverse(expected)) = heap.pop() {
-                prop_assert_eq!(queue.pop(), Some(expected));
-            }
-            prop_assert_eq!(queue.pop(), None);
+            let mut buckets = Buckets::default();
+            prop_assert!(buckets.clear(span, span * share));
+            let mut sorted = Sorted::default();
+            sorted.clear();
+            prop_assert!(!buckets.clear(span, 0.0) && !buckets.clear(0.0, 0.0));
+            check(&mut buckets, span, &steps)?;
+            check(&mut sorted, span, &steps)?;
         }
+    }
+
+    fn check(
+        queue: &mut impl Queue,
+        span: f64,
+        steps: &[(bool, f64)],
+    ) -> Result<(), TestCaseError> {
+        let mut waiting: Vec<Waiting> = Vec::new();
+        let mut last: f64 = 0.0;
+        let pops = std::iter::repeat_n(&(false, 0.0), steps.len() + 1);
+        for (node, (push, ahead)) in steps.iter().chain(pops).enumerate() {
+            if *push {
+                let new = Waiting::new(last + ahead * span, node);
+                queue.push(new.cost, new);
+                waiting.push(new);
+                continue;
+            }
+            let found = queue.pop();
+            prop_assert_eq!(found.is_some(), !waiting.is_empty());
+            if let Some(found) = found {
+                waiting.retain(|other| *other != found);
+                last = last.max(found.cost);
+                prop_assert!(!queue.is_past(found.cost));
+                prop_assert!(waiting.iter().all(|other| !queue.is_past(other.cost)));
+            }
+        }
+        Ok(())
     }
 }

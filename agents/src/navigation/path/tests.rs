@@ -171,38 +171,73 @@ fn ends_outside_the_grid_are_told_apart() {
     );
 }
 
+fn costs() -> impl Strategy<Value = f32> {
+    prop_oneof![4 => Just(1.0), 1 => Just(1.5), 1 => Just(2.0), 1 => Just(4.0), 3 => Just(BLOCKED)]
+}
+
+/// Both searches under every model against [`naive`].
+fn check_searches(grid: &CostGrid, ends: [prop::sample::Index; 2]) -> Result<(), TestCaseError> {
+    let [start, goal] = ends.map(|end| {
+        let index = end.index(grid.costs.len());
+        (index % grid.width, index / grid.width)
+    });
+    let mut search = Search::default();
+    for model in MODELS {
+        let least = naive(grid, start, goal, model);
+        for algorithm in [Algorithm::Dijkstra, Algorithm::AStar] {
+            let request = Request {
+                model,
+                algorithm,
+                ..Request::new(start, goal)
+            };
+            match search.find(grid, &request) {
+                Ok(path) => {
+                    prop_assert!((path.cost - least).abs() < 1e-9);
+                    prop_assert!((cost_of(grid, &path.cells, model) - least).abs() < 1e-9);
+                    prop_assert_eq!(path.cells.first(), Some(&start));
+                    prop_assert_eq!(path.cells.last(), Some(&goal));
+                }
+                Err(_) => prop_assert!(
+                    least.is_infinite()
+                        || grid.cost(goal) == BLOCKED
+                        || grid.cost(start) == BLOCKED
+                ),
+            }
+        }
+    }
+    Ok(())
+}
+
 proptest! {
     #[test]
     fn every_search_finds_the_least_cost(
         (width, height) in (2..12usize, 2..12usize),
-        cells in proptest::collection::vec(
-            prop_oneof![4 => Just(1.0), 1 => Just(1.5), 1 => Just(2.0), 1 => Just(4.0), 3 => Just(BLOCKED)],
-            144,
-        ),
+        cells in proptest::collection::vec(costs(), 144),
         ends in any::<[prop::sample::Index; 2]>(),
     ) {
         let mut grid = CostGrid::covering([0.0, 0.0, width as f64, height as f64], 1.0);
         grid.costs.copy_from_slice(&cells[..width * height]);
-        let [start, goal] = ends.map(|end| {
-            let index = end.index(width * height);
-            (index % width, index / width)
-        });
-        let mut search = Search::default();
-        for model in MODELS {
-            let least = naive(&grid, start, goal, model);
-            for algorithm in [Algorithm::Dijkstra, Algorithm::AStar] {
-                let request = Request { model, algorithm, ..Request::new(start, goal) };
-                match search.find(&grid, &request) {
-                    Ok(path) => {
-                        prop_assert!((path.cost - least).abs() < 1e-9);
-                        prop_assert!((cost_of(&grid, &path.cells, model) - least).abs() < 1e-9);
-                        prop_assert_eq!(path.cells.first(), Some(&start));
-                        prop_assert_eq!(path.cells.last(), Some(&goal));
-                    }
-                    Err(_) => prop_assert!(least.is_infinite()
-                        || grid.cost(goal) == BLOCKED || grid.cost(start) == BLOCKED),
-                }
+        check_searches(&grid, ends)?;
+    }
+
+    /// In places of one cost a search leaves neighbours out.
+    #[test]
+    fn every_search_finds_the_least_cost_across_places_of_one_cost(
+        (width, height) in (4..24usize, 4..24usize),
+        places in proptest::collection::vec(
+            (any::<[prop::sample::Index; 2]>(), 1..12usize, 1..12usize, costs()), 0..8,
+        ),
+        free in prop_oneof![Just(FREE), Just(0.0)],
+        ends in any::<[prop::sample::Index; 2]>(),
+    ) {
+        let mut grid = CostGrid::covering([0.0, 0.0, width as f64, height as f64], 1.0);
+        grid.costs.fill(free);
+        for (corner, across, along, cost) in places {
+            let (left, low) = (corner[0].index(width), corner[1].index(height));
+            for row in low..(low + along).min(height) {
+                grid.costs[row * width..][left..(left + across).min(width)].fill(cost);
             }
         }
+        check_searches(&grid, ends)?;
     }
 }
