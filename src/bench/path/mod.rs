@@ -10,7 +10,7 @@ use crate::Failure;
 use agents::grid::{BLOCKED, Cell, CostGrid};
 use agents::navigation::band::{Band, Gains, Surroundings};
 use agents::navigation::obstacles::Obstacles;
-use agents::navigation::path::{Algorithm, CostModel, Replanner, Request, Search};
+use agents::navigation::path::{Algorithm, CostModel, PathError, Replanner, Request, Search};
 use floor::RESOLUTION;
 use nalgebra::Point2;
 use std::hint::black_box;
@@ -90,17 +90,28 @@ fn searches(
     Ok(())
 }
 
-/// Time until there is a path again when somebody steps on it, as the robot goes along.
-fn replanning(figures: &mut Vec<Figure>) -> Result<(), Failure> {
-    let mut grid = floor::floor(400);
+/// How often somebody stands in the way and is gone again.
+const VISITORS: usize = 30;
+
+/// Time until there is a path again when somebody steps on it, as the robot goes along a floor of `side`
+/// x `side` cells: beside the same planner as it begins anew, and beside A*.
+fn replanning(
+    names: [&'static str; 2],
+    side: usize,
+    figures: &mut Vec<Figure>,
+) -> Result<(), Failure> {
+    let mut grid = floor::floor(side);
     let [start, goal] = floor::corners(&grid);
     let mut chance = Chance::new(8);
-    let mut planner =
-        Replanner::new(&grid, goal, CostModel::LengthMean).map_err(Failure::internal)?;
+    let planner_from = |grid: &CostGrid, robot: Cell| {
+        let mut planner = Replanner::new(grid, goal, CostModel::LengthMean)?;
+        let path = planner.find(grid, robot)?;
+        Ok::<_, PathError>((planner, path))
+    };
+    let (mut planner, mut path) = planner_from(&grid, start).map_err(Failure::internal)?;
     let mut search = Search::default();
-    let mut path = planner.find(&grid, start).map_err(Failure::internal)?;
-    let (mut again, mut scratch) = (Vec::new(), Vec::new());
-    while path.cells.len() > 120 && again.len() < 60 {
+    let (mut again, mut anew, mut scratch) = (Vec::new(), Vec::new(), Vec::new());
+    while path.cells.len() > 120 && again.len() < 2 * VISITORS {
         // The robot goes on by 4 cells; somebody stands up to 4 m ahead, then is gone.
         let robot = path.cells[4];
         let ahead = path.cells[24 + chance.below(60) as usize];
@@ -132,14 +143,23 @@ fn replanning(figures: &mut Vec<Figure>) -> Result<(), Failure> {
             again.push(ours);
             scratch.push(theirs);
         }
+        if anew.len() < 5 {
+            anew.push(time(|| planner_from(&grid, robot)).0);
+        }
     }
-    figures.push(Figure {
-        name: "replan_400",
-        value: median(&mut again) * 1e-6,
-        unit: "ms",
-        raw: Some(median(&mut scratch) * 1e-6),
-        peer: "our own A* from scratch".to_owned(),
-    });
+    let value = median(&mut again) * 1e-6;
+    for (name, mut samples, peer) in [
+        (names[0], anew, "the same planner from scratch"),
+        (names[1], scratch, "our own A* from scratch"),
+    ] {
+        figures.push(Figure {
+            name,
+            value,
+            unit: "ms",
+            raw: Some(median(&mut samples) * 1e-6),
+            peer: peer.to_owned(),
+        });
+    }
     Ok(())
 }
 
@@ -199,7 +219,8 @@ pub(crate) fn paths() -> Result<Vec<Figure>, Failure> {
         3,
         &mut figures,
     )?;
-    replanning(&mut figures)?;
+    replanning(["replan_400", "replan_400_astar"], 400, &mut figures)?;
+    replanning(["replan_2000", "replan_2000_astar"], 2000, &mut figures)?;
     band(&mut figures);
     Ok(figures)
 }

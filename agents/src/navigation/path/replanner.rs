@@ -3,7 +3,8 @@
 //! Replanning for Navigation in Unknown Terrain", 2005). This file guarantees the cost that a search
 //! from scratch finds.
 
-use super::lattice::{BESIDE, Lattice, node_cost};
+use super::canonical::{self, START};
+use super::lattice::{Lattice, node_cost};
 use super::{CostModel, Path, PathError, check_inside, free, told};
 use crate::grid::{Cell, CostGrid};
 use std::cmp::Reverse;
@@ -52,7 +53,8 @@ type Key = (u64, u64);
 /// let cell = grid.index((2, 1));
 /// grid.costs[cell] = BLOCKED;
 /// planner.update(&grid, [(2, 1)]);
-/// assert_eq!(planner.find(&grid, (1, 1))?.cost, 5.0);
+/// let round = 3.0 + std::f64::consts::SQRT_2;
+/// assert!((planner.find(&grid, (1, 1))?.cost - round).abs() < 1e-9);
 /// # Ok::<(), agents::navigation::path::PathError>(())
 /// ```
 #[derive(Debug, Clone)]
@@ -256,27 +258,20 @@ impl Replanner {
 
     /// The neighbours that a step joins a node with, either way, and its length.
     fn neighbours(&self, at: usize) -> impl Iterator<Item = (usize, f64)> + use<> {
-        let free = |node: usize| self.lattice.costs[node].is_finite();
-        let mut joined = [(0, 0.0); 8];
-        let mut count = 0;
-        if free(at) {
-            let mut straight_free = [false; 4];
-            for (k, step) in self.lattice.steps().into_iter().enumerate() {
-                let neighbour = at.wrapping_add_signed(step);
-                let open = free(neighbour);
-                let length = if k < 4 {
-                    straight_free[k] = open;
-                    1.0
-                } else {
-                    SQRT_2
-                };
-                if open && (k < 4 || BESIDE[k - 4].iter().all(|&side| straight_free[side])) {
-                    joined[count] = (neighbour, length);
-                    count += 1;
-                }
-            }
-        }
-        joined.into_iter().take(count)
+        let mut joined = if self.lattice.costs[at].is_finite() {
+            let (free, _) = self.lattice.around(at);
+            canonical::offers()[usize::from(START)][usize::from(free)]
+        } else {
+            0
+        };
+        let steps = self.lattice.steps();
+        std::iter::from_fn(move || {
+            let k = joined.trailing_zeros() as usize;
+            let step = steps.get(k)?;
+            joined &= joined - 1;
+            let length = if k < 4 { 1.0 } else { SQRT_2 };
+            Some((at.wrapping_add_signed(*step), length))
+        })
     }
 
     /// What a step costs.
