@@ -1,6 +1,7 @@
 //! The elastic band (paper TD 5.3, eq. 13 to 16): a path that tightens by itself and yields to
-//! obstacles and people. This file guarantees that no point is ever moved to where the robot would
-//! touch an obstacle, and that a band which cannot stay free says so.
+//! obstacles and people. This file guarantees that no point is ever moved so that the robot would
+//! touch an obstacle at it or half-way to its neighbours, nor to a place that the social grid holds
+//! dearer; and that a band which cannot stay free says so.
 //!
 //! Eq. 14 and 15 are read as READING.md item 12 settles them: the force points along the gradient
 //! of the clearance, and acts below the distance `D0`. The part of it along the band is removed
@@ -9,6 +10,7 @@
 
 use super::obstacles::Obstacles;
 use super::people::Person;
+use crate::grid::{BLOCKED, CostGrid};
 use nalgebra::{Point2, Vector2, distance};
 
 /// The band's gains, SI units (READING.md item 12). The figures of length are the authors' own.
@@ -53,11 +55,16 @@ const SOCIAL_REACH: f64 = 2.41;
 /// Constant velocity says nothing about people farther ahead in time than this, seconds.
 const FORESIGHT: f64 = 4.0;
 
+/// Where no point moves farther in an update, the band has settled, metres.
+const REST: f64 = 1e-3;
+
 /// What an update came to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum BandState {
-    /// Every point is free.
-    Free,
+    /// Every point is free, or was lately, and some move on.
+    Moving,
+    /// Every point is free, and the forces cancel out.
+    Settled,
     /// The band has touched an obstacle for several updates and cannot get away: ask for a path.
     Broken {
         /// Where it touches, world frame.
@@ -72,6 +79,8 @@ pub struct Surroundings<'a> {
     pub obstacles: &'a Obstacles,
     /// People whose space repels; none where the robot shall not be social.
     pub people: &'a [Person],
+    /// What places cost, such as in the space of an object in use; forces know nothing of it.
+    pub grid: Option<&'a CostGrid>,
     /// The robot's radius, metres.
     pub radius: f64,
     /// The speed at which the robot is taken to follow the band, m/s.
@@ -82,6 +91,8 @@ pub struct Surroundings<'a> {
 #[derive(Debug, Clone, Default)]
 pub struct Band {
     points: Vec<Point2<f64>>,
+    /// Of each point when the band was last updated, metres.
+    radii: Vec<f64>,
     touching: u32,
     near: Obstacles,
 }
@@ -93,13 +104,19 @@ impl Band {
             points: path.to_vec(),
             ..Self::default()
         };
-        band.space(gains.spacing);
+        band.space(gains.spacing, |_, _| true);
         band
     }
 
     /// The points from the robot to the goal, world frame; empty where there is no band.
     pub fn points(&self) -> &[Point2<f64>] {
         &self.points
+    }
+
+    /// The radii of the bubbles about the points, metres (TD 5.3): the clearance of each at the last
+    /// update, as far as obstacles repel. The ends have none of their own and take their neighbour's.
+    pub fn radii(&self) -> &[f64] {
+        &self.radii
     }
 
     /// Its length, metres.
@@ -139,6 +156,9 @@ impl Band {
                 > 0.0;
         let keep = if passed { nearest + 1 } else { nearest.max(1) };
         self.points.drain(1..keep);
+        if keep <= self.radii.len() {
+            self.radii.drain(1..keep);
+        }
         self.points[0] = robot;
     }
 
@@ -148,35 +168,40 @@ impl Band {
         let mut near = std::mem::take(&mut self.near);
         // A point moves at most so far during this update; what is beyond cannot act on it.
         let reach = gains.reach + gains.delta + LARGEST_STEP * iterations as f64;
-        self.space(gains.spacing);
-        let mut along = 0.0;
+        self.space(gains.spacing, |before, after| {
+            let middle = nalgebra::center(&before, &after);
+            around.obstacles.clearance(middle) >= around.radius
+        });
+        self.radii.clear();
+        self.radii.resize(self.points.len(), gains.reach);
+        let (mut along, mut farthest) = (0.0, 0.0);
         for i in 1..self.points.len().saturating_sub(1) {
             along += distance(&self.points[i - 1], &self.points[i]);
-            around
-                .obstacles
-                .collect_near(self.points[i], reach, &mut near);
+            let start = self.points[i];
+            around.obstacles.collect_near(start, reach, &mut near);
             let time = (along / around.speed.max(0.05)).min(FORESIGHT);
             for _ in 0..iterations {
                 self.relax(i, &near, around, gains, time);
             }
-            if touching.is_none() && near.clearance(self.points[i]) < around.radius - NOISE {
+            farthest = f64::max(farthest, distance(&start, &self.points[i]));
+            let clearance = near.clearance(self.points[i]);
+            self.radii[i] = clearance.min(gains.reach);
+            if touching.is_none() && clearance < around.radius - NOISE {
                 touching = Some(self.points[i]);
             }
         }
+        if let [first, second, .., before, last] = &mut self.radii[..] {
+            (*first, *last) = (*second, *before);
+        }
         self.near = near;
+        self.touching = match touching {
+            Some(_) => self.touching + 1,
+            None => 0,
+        };
         match touching {
-            Some(at) => {
-                self.touching += 1;
-                if self.touching >= PATIENCE {
-                    BandState::Broken { at }
-                } else {
-                    BandState::Free
-                }
-            }
-            None => {
-                self.touching = 0;
-                BandState::Free
-            }
+            Some(at) if self.touching >= PATIENCE => BandState::Broken { at },
+            None if farthest <= REST => BandState::Settled,
+            _ => BandState::Moving,
         }
     }
 
@@ -199,10 +224,23 @@ impl Band {
         let push = repulsion + social;
         let push = push - tangent * push.dot(&tangent);
         let mut step = (contraction + push).cap_magnitude(LARGEST_STEP);
+        let cost = |place| {
+            let cell = around
+                .grid
+                .and_then(|grid| Some(grid.cost(grid.cell_at(place)?)));
+            cell.unwrap_or(BLOCKED)
+        };
+        let middles =
+            |place| [before, after].map(|end| near.clearance(nalgebra::center(&end, &place)));
+        let tightest = middles(here);
         for _ in 0..3 {
             let there = here + step;
-            let after = near.clearance(there);
-            if after >= around.radius || after >= clearance {
+            let open = |now: f64, then: f64| then >= around.radius || then >= now;
+            let between = tightest.into_iter().zip(middles(there));
+            if open(clearance, near.clearance(there))
+                && between.into_iter().all(|(now, then)| open(now, then))
+                && (around.grid.is_none() || cost(there) <= cost(here))
+            {
                 self.points[i] = there;
                 return;
             }
@@ -210,12 +248,14 @@ impl Band {
         }
     }
 
-    /// Drops a point whose neighbours are at most `spacing` apart, and inserts points where two are
-    /// farther apart: on a straight stretch no point is inserted only to be dropped again.
-    fn space(&mut self, spacing: f64) {
+    /// Drops a point whose neighbours are at most `spacing` apart, if they `may_join`, and inserts
+    /// points where two are farther apart: on a straight stretch no point is inserted only to be
+    /// dropped again.
+    fn space(&mut self, spacing: f64, may_join: impl Fn(Point2<f64>, Point2<f64>) -> bool) {
         let mut k = 1;
         while k + 1 < self.points.len() {
-            if distance(&self.points[k - 1], &self.points[k + 1]) <= spacing {
+            let (before, after) = (self.points[k - 1], self.points[k + 1]);
+            if distance(&before, &after) <= spacing && may_join(before, after) {
                 self.points.remove(k);
             } else {
                 k += 1;

@@ -185,6 +185,7 @@ fn band(figures: &mut Vec<Figure>) {
     let around = Surroundings {
         obstacles: &obstacles,
         people: &[],
+        grid: None,
         radius: 0.3,
         speed: 0.6,
     };

@@ -16,7 +16,7 @@ const HEADWAY_WORTH: f64 = 3.0;
 
 impl Navigator {
     /// Lets the band move.
-    pub(super) fn relax(&mut self, view: &View, iterations: usize) -> BandState {
+    pub(super) fn relax(&mut self, grid: &CostGrid, view: &View, iterations: usize) -> BandState {
         let people = if view.inputs.social {
             view.inputs.people
         } else {
@@ -26,6 +26,7 @@ impl Navigator {
         let around = Surroundings {
             obstacles: &self.obstacles,
             people,
+            grid: Some(grid),
             radius: limits.radius,
             speed: limits.max_speed,
         };
@@ -34,7 +35,7 @@ impl Navigator {
 
     /// Follows the band, watches the headway.
     pub(super) fn drive(&mut self, course: &mut Course, grid: &CostGrid, view: &View) -> Decision {
-        let broken = matches!(self.relax(view, 2), BandState::Broken { .. });
+        let broken = matches!(self.relax(grid, view, 2), BandState::Broken { .. });
         let age = course
             .planned
             .map_or(0.0, |planned| view.now.since(planned));

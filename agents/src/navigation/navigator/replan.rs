@@ -120,7 +120,7 @@ impl Navigator {
         course.person = person.map_or(robot, Person::position);
         course.at_place = false;
         self.band = Band::new(&line, &self.config.gains);
-        self.relax(view, 20);
+        self.relax(grid, view, 20);
         course.price = price(grid, self.band.points()).cost;
         let length = self.band.length();
         // A person who walked off is no fault of the way; anything else that makes it longer is.
