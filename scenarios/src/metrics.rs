@@ -4,12 +4,18 @@
 //!
 //! World frame, SI units, radians; shares of time in percent.
 
+mod company;
+mod motion;
 mod object_space;
+mod shortest;
 #[cfg(test)]
 mod tests;
 
+pub use company::{COMPLIANT, Company, FORESIGHT, HALL, PsiDistance};
+pub use motion::{Motion, TURNING};
 pub(crate) use object_space::mapped;
 pub use object_space::{ObjectSpace, SpacesError, object_spaces};
+pub use shortest::{shortest_way, spl};
 
 use crate::world::{Collisions, Truth, wrap};
 use agents::social_mapping::{Zone, zone_at};
@@ -28,6 +34,10 @@ pub const MOVING: f64 = 0.05;
 pub struct Metrics {
     /// The robot's way; `None` without samples.
     pub robot: Option<RobotMetrics>,
+    /// How evenly it moved; `None` where no time passed.
+    pub motion: Option<Motion>,
+    /// How near it came to people on the whole; `None` where nobody was ever there.
+    pub company: Option<Company>,
     /// Everybody who was ever there, sorted by name.
     pub people: Vec<PersonMetrics>,
     /// Shares of the time; `None` where no time passed.
@@ -116,6 +126,8 @@ pub fn measure(samples: &[Truth], robot_radius: f64, spaces: &[ObjectSpace]) -> 
             collisions: last.collisions.total(),
             collisions_by_kind: last.collisions,
         }),
+        motion: motion::motion(&samples),
+        company: company::company(&samples, robot_radius),
         people: people(&samples, robot_radius),
         psi: all.psi(),
         psi_moving: moving.psi(),

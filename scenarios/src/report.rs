@@ -27,9 +27,15 @@ pub struct Report {
     pub social: bool,
     /// Whether every mission succeeded.
     pub success: bool,
+    /// Whether the time was up before a mission had ended.
+    pub timed_out: bool,
+    /// The shortest way from where the robot began to where it ended, with nobody there, m.
+    pub shortest_path: Option<f64>,
+    /// Success weighted by path length, in [0, 1]; see [`crate::metrics::spl`].
+    pub spl: Option<f64>,
     /// The missions; `None` where there were none.
     pub mission: Option<MissionReport>,
-    /// `robot`, `people`, `psi` and `psi_moving` of the run.
+    /// `robot`, `motion`, `company`, `people`, `psi` and `psi_moving` of the run.
     #[serde(flatten)]
     pub metrics: Metrics,
     /// The steps that were taken up, of all plans, in order.
@@ -94,7 +100,9 @@ pub struct AgentReport {
 pub struct Baseline {
     /// Whether every mission succeeded.
     pub success: bool,
-    /// `robot`, `people`, `psi` and `psi_moving` of that run.
+    /// Success weighted by path length.
+    pub spl: Option<f64>,
+    /// `robot`, `motion`, `company`, `people`, `psi` and `psi_moving` of that run.
     #[serde(flatten)]
     pub metrics: Metrics,
 }
@@ -122,6 +130,12 @@ impl MissionReport {
     /// All missions.
     pub fn missions(&self) -> &[MissionOutcome] {
         &self.missions
+    }
+
+    /// Whether one was still to be ended when the run was over.
+    pub fn timed_out(&self) -> bool {
+        let open = |mission: &MissionOutcome| matches!(&*mission.status, "queued" | "running");
+        self.missions.iter().any(open)
     }
 
     /// Whether all of them succeeded.

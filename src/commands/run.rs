@@ -6,12 +6,12 @@ use crate::conduct::{Recording, Settings, conduct};
 use crate::progress::Progress;
 use crate::{Answer, Failure};
 use executive::{Mission, MissionStep, StepStatus};
-use scenarios::metrics::{Metrics, ObjectSpace, measure, object_spaces};
+use scenarios::metrics::{Metrics, ObjectSpace, measure, object_spaces, shortest_way, spl};
 use scenarios::picture::{Picture, Run, png};
 use scenarios::report::{
     AgentReport, Baseline, FORMAT, MissionOutcome, MissionReport, Report, StepReport,
 };
-use scenarios::{Scenario, Tracks};
+use scenarios::{Scenario, Tracks, Truth};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -126,12 +126,24 @@ impl Plan<'_> {
         let other = baseline.map(|other| (other, measured(other)));
         let picture = self.picture(recording, &metrics, other.as_ref(), spaces);
         let mission = MissionReport::of(recording.missions.iter().map(mission).collect());
+        let shortest = |recording: &Recording| {
+            let place = |truth: &Truth| truth.world_from_robot.translation.vector.into();
+            let (first, last) = (recording.truths.first()?, recording.truths.last()?);
+            shortest_way(self.scenario, place(first), place(last))
+        };
+        let weighted = |recording: &Recording, metrics: &Metrics| {
+            let walked = metrics.robot.as_ref()?.path_length;
+            Some(spl(recording.succeeded(), shortest(recording)?, walked))
+        };
         let report = Report {
             format: FORMAT,
             scenario: self.scenario.name.clone(),
             seed: arguments.seed,
             social: !arguments.no_social,
             success: recording.succeeded(),
+            timed_out: mission.as_ref().is_some_and(MissionReport::timed_out),
+            shortest_path: shortest(recording),
+            spl: weighted(recording, &metrics),
             mission,
             metrics,
             plan: plan(&recording.missions),
@@ -151,6 +163,7 @@ impl Plan<'_> {
                 .collect(),
             baseline: other.map(|(other, metrics)| Baseline {
                 success: other.succeeded(),
+                spl: weighted(other, &metrics),
                 metrics,
             }),
         };

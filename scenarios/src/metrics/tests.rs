@@ -262,6 +262,93 @@ fn runs() -> impl Strategy<Value = Vec<Truth>> {
     })
 }
 
+#[test]
+fn speed_acceleration_jerk_and_stalled_time_follow_from_the_speeds() {
+    // 2 s at rest, up to 1 m/s within 2 s, 2 s on.
+    let speed = |t: f64| (0.5 * (t - 2.0)).clamp(0.0, 1.0);
+    let run: Vec<Truth> = (0..=60)
+        .map(|k| sample(0.1 * f64::from(k), 0.0, 0.0, speed(0.1 * f64::from(k))))
+        .collect();
+    let motion = measure(&run, RADIUS, &[]).motion.unwrap();
+    assert!((motion.mean_speed - 0.5).abs() < 1e-6 && close(motion.max_speed, 1.0));
+    assert!((motion.max_acceleration - 0.5).abs() < 1e-6);
+    assert!((motion.mean_acceleration - 1.0 / 6.0).abs() < 0.01);
+    // The acceleration changes by 0.5 m/s2 within a sample.
+    assert!((motion.max_jerk - 5.0).abs() < 1e-5, "{}", motion.max_jerk);
+    // Up to 0.05 m/s it stands: 2 s, and the tenth in which it comes to that.
+    assert!((motion.stalled - 2.1).abs() < 1e-6, "{}", motion.stalled);
+    assert_eq!(measure(&run[..1], RADIUS, &[]).motion, None);
+}
+
+#[test]
+fn distances_to_the_nearest_are_least_and_mean_both_ways() {
+    // 1 m/s toward somebody who stands 3 m ahead, for 2 s.
+    let run: Vec<Truth> = (0..=20)
+        .map(|k| {
+            let x = 0.1 * f64::from(k);
+            with(
+                sample(x, x, 0.0, 1.0),
+                &[("anna", 3.0, 0.0), ("ben", 9.0, 0.0)],
+            )
+        })
+        .collect();
+    let company = measure(&run, RADIUS, &[]).company.unwrap();
+    assert!(close(company.min_distance, 1.0) && close(company.min_clearance, 0.55));
+    // A sample stands for the time until the next.
+    assert!((company.mean_distance - 2.05).abs() < 1e-6);
+    assert!((company.mean_clearance - 1.6).abs() < 1e-6);
+    assert!((company.time_to_collision.unwrap() - 0.55).abs() < 1e-9);
+    assert!(close(company.space_compliance, 100.0));
+    let psi = company.psi_distance;
+    assert!(close(psi.intimate, 0.0) && close(psi.public, 0.0));
+    assert!((psi.personal - 10.0).abs() < 5.1 && close(psi.personal + psi.social, 100.0));
+    // Nobody who is left behind is run into.
+    let away: Vec<Truth> = [0.0, 1.0]
+        .map(|t| with(sample(t, t, 0.0, 1.0), &[("anna", -1.0, 0.0)]))
+        .to_vec();
+    let company = measure(&away, RADIUS, &[]).company.unwrap();
+    assert_eq!(company.time_to_collision, None);
+    assert_eq!(
+        measure(&[sample(0.0, 0.0, 0.0, 1.0)], RADIUS, &[]).company,
+        None
+    );
+}
+
+#[test]
+fn who_passes_between_two_who_talk_is_in_a_group() {
+    let facing = |x: f64, heading: f64, name: &str| Body {
+        heading,
+        ..Body::standing(name, Point2::new(x, 0.0), 0.0, 0.2)
+    };
+    let passing = |y: f64| {
+        let run: Vec<Truth> = [0.0, 1.0]
+            .map(|t| {
+                let mut sample = sample(t, 0.0, y, 0.5);
+                sample.people = vec![facing(-0.7, 0.0, "anna"), facing(0.7, PI, "ben")];
+                sample
+            })
+            .to_vec();
+        measure(&run, RADIUS, &[]).company.unwrap().psi_groups
+    };
+    assert!(close(passing(0.1), 100.0) && close(passing(1.0), 0.0));
+}
+
+#[test]
+fn the_shortest_way_goes_round_walls_and_weighs_success() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("care-centre");
+    let scenario = Scenario::load(&folder).unwrap();
+    let (charger, kitchen) = (Point2::new(0.8, 6.0), Point2::new(18.0, 3.0));
+    let way = shortest_way(&scenario, charger, kitchen).unwrap();
+    let straight = (kitchen - charger).norm();
+    assert!(way > straight && way < 1.3 * straight, "{way}");
+    assert_eq!(
+        shortest_way(&scenario, charger, Point2::new(99.0, 0.0)),
+        None
+    );
+    assert!(close(spl(true, 10.0, 12.5), 0.8) && close(spl(true, 10.0, 9.9), 1.0));
+    assert!(close(spl(false, 10.0, 10.0), 0.0));
+}
+
 proptest! {
     #[test]
     fn the_four_shares_sum_to_a_hundred(run in runs()) {

@@ -52,6 +52,62 @@ impl Runs<'_> {
         self.row(label, unit, |metrics| metrics.robot.as_ref().map(&figure))
     }
 
+    /// Figures of how evenly the robot moved, and how near it came to people on the whole.
+    fn conduct(&self) -> Vec<Row> {
+        let both =
+            |mean: f64, greatest: f64| Some(format!("{} ({})", fixed(mean, 2), fixed(greatest, 2)));
+        vec![
+            self.row("mean speed (greatest)", "m/s", |metrics| {
+                metrics
+                    .motion
+                    .and_then(|motion| both(motion.mean_speed, motion.max_speed))
+            }),
+            self.row("mean acceleration (greatest)", "m/s2", |metrics| {
+                metrics
+                    .motion
+                    .and_then(|motion| both(motion.mean_acceleration, motion.max_acceleration))
+            }),
+            self.row("mean jerk (greatest)", "m/s3", |metrics| {
+                metrics
+                    .motion
+                    .and_then(|motion| both(motion.mean_jerk, motion.max_jerk))
+            }),
+            self.row("stalled", "s", |metrics| {
+                metrics.motion.map(|motion| fixed(motion.stalled, 1))
+            }),
+            self.row("distance to the nearest, mean (least)", "m", |metrics| {
+                metrics
+                    .company
+                    .and_then(|company| both(company.mean_distance, company.min_distance))
+            }),
+            self.row("the same between surfaces", "m", |metrics| {
+                metrics
+                    .company
+                    .and_then(|company| both(company.mean_clearance, company.min_clearance))
+            }),
+            self.row("least time to a collision", "s", |metrics| {
+                metrics
+                    .company
+                    .and_then(|company| company.time_to_collision)
+                    .map(|time| fixed(time, 1))
+            }),
+            self.row(
+                "share of time with 0.5 m of space for all",
+                "%",
+                |metrics| {
+                    metrics
+                        .company
+                        .map(|company| fixed(company.space_compliance, 1))
+                },
+            ),
+            self.row(
+                "share of time between the members of a group",
+                "%",
+                |metrics| metrics.company.map(|company| fixed(company.psi_groups, 1)),
+            ),
+        ]
+    }
+
     fn shares(&self, title: &str, psi: impl Fn(&Metrics) -> Option<Psi>) -> Vec<Row> {
         let share = |label: &str, part: fn(&Psi) -> f64| {
             self.row(label, "%", |metrics| {
@@ -151,6 +207,20 @@ pub(super) fn of(report: &Report) -> String {
             format!("{} ({walls}, {objects}, {people})", robot.collisions)
         }),
     ];
+    let weighted = [
+        Some(report.spl),
+        report.baseline.as_ref().map(|other| other.spl),
+    ];
+    rows.push(Row::Figures {
+        label: "success weighted by path length (SPL)".to_owned(),
+        unit: "",
+        cells: weighted
+            .into_iter()
+            .flatten()
+            .map(|spl| spl.map_or_else(|| MISSING.to_owned(), |spl| fixed(spl, 2)))
+            .collect(),
+    });
+    rows.extend(runs.conduct());
     rows.extend(runs.shares("share of time in", |metrics| metrics.psi));
     rows.extend(runs.shares(
         &format!("share of moving time (over {MOVING} m/s) in"),

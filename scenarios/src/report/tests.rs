@@ -27,6 +27,8 @@ fn metrics(path_length: f64, people: &[(&str, f64)], shares: [f64; 5], bumps: u6
             collisions: collisions_by_kind.total(),
             collisions_by_kind,
         }),
+        motion: None,
+        company: None,
         people: people
             .iter()
             .map(|(name, min_distance)| PersonMetrics {
@@ -56,6 +58,9 @@ fn report() -> Report {
         seed: 7,
         social: true,
         success: true,
+        timed_out: false,
+        shortest_path: Some(12.5),
+        spl: Some(0.89),
         mission: MissionReport::of(vec![mission("visit", "succeeded", None)]),
         metrics: metrics(
             14.03,
@@ -84,6 +89,7 @@ fn the_table_compares_the_run_with_and_without_social_behaviour() {
     let mut report = report();
     report.baseline = Some(Baseline {
         success: false,
+        spl: Some(0.0),
         metrics: metrics(
             12.81,
             &[("anna", 0.51), ("cleo", 4.0)],
@@ -94,28 +100,38 @@ fn the_table_compares_the_run_with_and_without_social_behaviour() {
     expect![[r"
         care-centre, seed 7: mission succeeded
 
-                                                   social behaviour   no social behaviour
-        mission                                           succeeded                failed
-        path length                          m                14.03                 12.81
-        duration                             s                 42.1                  38.4
-        heading changes (CHC, every 0.2 m)   rad               1.75                  1.75
-        collisions (walls, objects, people)             0 (0, 0, 0)           1 (0, 0, 1)
+                                                             social behaviour   no social behaviour
+        mission                                                     succeeded                failed
+        path length                                   m                 14.03                 12.81
+        duration                                      s                  42.1                  38.4
+        heading changes (CHC, every 0.2 m)            rad                1.75                  1.75
+        collisions (walls, objects, people)                       0 (0, 0, 0)           1 (0, 0, 1)
+        success weighted by path length (SPL)                            0.89                  0.00
+        mean speed (greatest)                         m/s                   -                     -
+        mean acceleration (greatest)                  m/s2                  -                     -
+        mean jerk (greatest)                          m/s3                  -                     -
+        stalled                                       s                     -                     -
+        distance to the nearest, mean (least)         m                     -                     -
+        the same between surfaces                     m                     -                     -
+        least time to a collision                     s                     -                     -
+        share of time with 0.5 m of space for all     %                     -                     -
+        share of time between the members of a group  %                     -                     -
         share of time in
-          intimate zone                      %                  0.0                   4.2
-          personal zone                      %                  8.0                   1.0
-          social zone                        %                 11.0                  12.4
-          public space                       %                 81.0                  82.4
-          space of an object in use          %                  1.6                  35.0
+          intimate zone                               %                   0.0                   4.2
+          personal zone                               %                   8.0                   1.0
+          social zone                                 %                  11.0                  12.4
+          public space                                %                  81.0                  82.4
+          space of an object in use                   %                   1.6                  35.0
         share of moving time (over 0.05 m/s) in
-          intimate zone                      %                    -                     -
-          personal zone                      %                    -                     -
-          social zone                        %                    -                     -
-          public space                       %                    -                     -
-          space of an object in use          %                    -                     -
+          intimate zone                               %                     -                     -
+          personal zone                               %                     -                     -
+          social zone                                 %                     -                     -
+          public space                                %                     -                     -
+          space of an object in use                   %                     -                     -
         least distance of centres (of surfaces)
-          anna                               m          1.39 (0.94)           0.51 (0.06)
-          ben                                m          2.14 (1.69)                     -
-          cleo                               m                    -           4.00 (3.55)
+          anna                                        m           1.39 (0.94)           0.51 (0.06)
+          ben                                         m           2.14 (1.69)                     -
+          cleo                                        m                     -           4.00 (3.55)
     "]]
     .assert_eq(&report.table());
 }
@@ -139,33 +155,43 @@ fn a_crowd_is_cut_to_the_closest() {
     expect![[r"
         care-centre, seed 7: mission visit failed: anna left
 
-                                                   social behaviour
-        mission                                              failed
-        path length                          m                 9.00
-        duration                             s                 27.0
-        heading changes (CHC, every 0.2 m)   rad               1.75
-        collisions (walls, objects, people)             0 (0, 0, 0)
+                                                             social behaviour
+        mission                                                        failed
+        path length                                   m                  9.00
+        duration                                      s                  27.0
+        heading changes (CHC, every 0.2 m)            rad                1.75
+        collisions (walls, objects, people)                       0 (0, 0, 0)
+        success weighted by path length (SPL)                            0.89
+        mean speed (greatest)                         m/s                   -
+        mean acceleration (greatest)                  m/s2                  -
+        mean jerk (greatest)                          m/s3                  -
+        stalled                                       s                     -
+        distance to the nearest, mean (least)         m                     -
+        the same between surfaces                     m                     -
+        least time to a collision                     s                     -
+        share of time with 0.5 m of space for all     %                     -
+        share of time between the members of a group  %                     -
         share of time in
-          intimate zone                      %                  0.0
-          personal zone                      %                  0.0
-          social zone                        %                  0.0
-          public space                       %                100.0
-          space of an object in use          %                    -
+          intimate zone                               %                   0.0
+          personal zone                               %                   0.0
+          social zone                                 %                   0.0
+          public space                                %                 100.0
+          space of an object in use                   %                     -
         share of moving time (over 0.05 m/s) in
-          intimate zone                      %                    -
-          personal zone                      %                    -
-          social zone                        %                    -
-          public space                       %                    -
-          space of an object in use          %                    -
+          intimate zone                               %                     -
+          personal zone                               %                     -
+          social zone                                 %                     -
+          public space                                %                     -
+          space of an object in use                   %                     -
         least distance of centres (of surfaces)
-          walker_11                          m          2.25 (1.80)
-          walker_10                          m          2.50 (2.05)
-          walker_9                           m          2.75 (2.30)
-          walker_8                           m          3.00 (2.55)
-          walker_7                           m          3.25 (2.80)
-          walker_6                           m          3.50 (3.05)
-          walker_5                           m          3.75 (3.30)
-          walker_4                           m          4.00 (3.55)
+          walker_11                                   m           2.25 (1.80)
+          walker_10                                   m           2.50 (2.05)
+          walker_9                                    m           2.75 (2.30)
+          walker_8                                    m           3.00 (2.55)
+          walker_7                                    m           3.25 (2.80)
+          walker_6                                    m           3.50 (3.05)
+          walker_5                                    m           3.75 (3.30)
+          walker_4                                    m           4.00 (3.55)
           and 4 more, none closer than 4.25 m
     "]]
     .assert_eq(&report.table());
@@ -180,24 +206,34 @@ fn a_run_that_recorded_nothing_has_a_table_of_dashes() {
     expect![[r"
         care-centre, seed 7: no mission
 
-                                                   no social behaviour
-        mission                                                      -
-        path length                          m                       -
-        duration                             s                       -
-        heading changes (CHC, every 0.2 m)   rad                     -
-        collisions (walls, objects, people)                          -
+                                                             no social behaviour
+        mission                                                                -
+        path length                                   m                        -
+        duration                                      s                        -
+        heading changes (CHC, every 0.2 m)            rad                      -
+        collisions (walls, objects, people)                                    -
+        success weighted by path length (SPL)                               0.89
+        mean speed (greatest)                         m/s                      -
+        mean acceleration (greatest)                  m/s2                     -
+        mean jerk (greatest)                          m/s3                     -
+        stalled                                       s                        -
+        distance to the nearest, mean (least)         m                        -
+        the same between surfaces                     m                        -
+        least time to a collision                     s                        -
+        share of time with 0.5 m of space for all     %                        -
+        share of time between the members of a group  %                        -
         share of time in
-          intimate zone                      %                       -
-          personal zone                      %                       -
-          social zone                        %                       -
-          public space                       %                       -
-          space of an object in use          %                       -
+          intimate zone                               %                        -
+          personal zone                               %                        -
+          social zone                                 %                        -
+          public space                                %                        -
+          space of an object in use                   %                        -
         share of moving time (over 0.05 m/s) in
-          intimate zone                      %                       -
-          personal zone                      %                       -
-          social zone                        %                       -
-          public space                       %                       -
-          space of an object in use          %                       -
+          intimate zone                               %                        -
+          personal zone                               %                        -
+          social zone                                 %                        -
+          public space                                %                        -
+          space of an object in use                   %                        -
     "]]
     .assert_eq(&report.table());
 }
@@ -212,6 +248,9 @@ fn the_json_has_the_fields_that_are_promised() {
           "seed": 7,
           "social": true,
           "success": true,
+          "timed_out": false,
+          "shortest_path": 12.5,
+          "spl": 0.89,
           "mission": {
             "name": "visit",
             "goal": "{ robot:robot anna:person } { }",
@@ -237,6 +276,8 @@ fn the_json_has_the_fields_that_are_promised() {
               "people": 0
             }
           },
+          "motion": null,
+          "company": null,
           "people": [
             {
               "name": "anna",
