@@ -1,8 +1,7 @@
 //! Measuring what Cortex is made of: the shared graph beside raw iceoryx2 and a copy on the heap, the
 //! planner from text to plan, rules beside other matchers, social maps beside numpy, path search beside
-//! others. It guarantees
-//! that a figure and the one it is compared with come from the same run, taken in turns where both are
-//! short.
+//! others. It guarantees that a figure and the one it is compared with come from the same run, taken in
+//! turns where both are short.
 //!
 //! Who measures the graph starts a store and peers by executing the program again, in an instance of
 //! its own, and ends and removes all of them.
