@@ -285,12 +285,15 @@ fn a_graph_grows_while_readers_that_came_before_go_on_reading() {
     let mut session = Session::attach(&instance.0, "grower", PATIENCE).unwrap();
     let mut early = Process::start("sum", &instance, &[]);
     assert_eq!(early.line(), "ready");
-    let nodes = crate::support::size("CORTEX_NODES", 250_000);
-    let batch = 5_000;
+    let nodes = crate::support::size("CORTEX_NODES", 100_000);
+    let batch = 1_000;
     for start in (0..nodes).step_by(batch) {
         let mut transaction = Transaction::new();
         for i in start..nodes.min(start + batch) {
-            let attributes = vec![("n".into(), Value::U64(1)), ("row".into(), [0.5; 6].into())];
+            let attributes = vec![
+                ("n".into(), Value::U64(1)),
+                ("row".into(), Value::F64List(vec![0.5; 320])),
+            ];
             transaction.create_node("thing", &format!("node{i}"), attributes);
         }
         session.commit(&transaction, Time::default()).unwrap();
@@ -300,7 +303,7 @@ fn a_graph_grows_while_readers_that_came_before_go_on_reading() {
         use std::os::unix::fs::MetadataExt;
         std::fs::metadata(path).map_or(0, |file| file.blocks() * 512)
     });
-    let segment = 64 << 20;
+    let segment = 256 << 20;
     assert!(largest.max() > Some(segment), "it fits in one segment");
     assert_eq!(session.snapshot().unwrap().node_count(), nodes as u64);
     // Who was there before it grew, who comes after, and this one count the same.

@@ -69,7 +69,12 @@ fn fill_up(instance: &Instance) -> Outcome {
         session.snapshot()?.node_count();
     }
     println!("full by others");
+    let late = match session.commit(&large("late"), Time::default()) {
+        Err(dsr::CommitError::Attach(dsr::AttachError::Instance(error))) => Err(error),
+        other => return Err(format!("{other:?}").into()),
+    };
     for attempt in [
+        late,
         Session::join(instance, "late").map(|_| ()),
         session.subscriber::<u64>("late").map(|_| ()),
         sender.send(&vec![1; 1 << 20]),

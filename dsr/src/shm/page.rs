@@ -4,8 +4,8 @@
 
 use super::session::NEWS;
 use super::{
-    InstanceError, Ipc, IpcNode, MAX_PROCESSES, Segment, ipc, now, one_at_a_time, pause, port,
-    service_name,
+    InstanceError, Ipc, IpcNode, MAX_PROCESSES, ROOM, Segment, ipc, now, one_at_a_time, pause,
+    port, room_for, service_name,
 };
 use crate::arena::Word;
 use iceoryx2::port::publisher::Publisher as IpcPublisher;
@@ -27,6 +27,7 @@ pub(super) const LINE: Alignment = Alignment::ALIGN_64;
 type Factory = PortFactory<Ipc, [Word], ()>;
 
 fn service(node: &IpcNode, name: &str) -> Result<Factory, InstanceError> {
+    room_for(ROOM)?;
     let builder = node
         .service_builder(&service_name(name)?)
         .publish_subscribe::<[Word]>()

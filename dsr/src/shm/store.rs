@@ -135,7 +135,7 @@ impl Store {
             Graph::on(memory, growth, schema, epoch).map_err(|Full| StoreError::OutOfMemory)?;
         let server = requests(&node)?
             .server_builder()
-            .initial_max_slice_len(1024)
+            .initial_max_slice_len(answer::SMALL)
             .allocation_strategy(AllocationStrategy::PowerOfTwo)
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .override_response_preallocation(|worst| worst.min(ANSWERS))

@@ -2,7 +2,8 @@
 //! come of them. It guarantees that a request which got lost is sent again, and applied once.
 
 use super::super::{
-    InstanceError, Ipc, IpcNode, MAX_PROCESSES, bell, ipc, now, one_at_a_time, port, service_name,
+    InstanceError, Ipc, IpcNode, MAX_PROCESSES, ROOM, bell, ipc, now, one_at_a_time, port,
+    room_for, service_name,
 };
 use super::{AttachError, PATIENCE, Session, ring};
 use crate::arena::Arena;
@@ -19,6 +20,8 @@ const REQUESTS: &str = "graph/requests";
 /// Answers that can be under way at once. iceoryx2 would make room for thousands, which costs each
 /// client 14 MB of its own.
 pub(in crate::shm) const ANSWERS: usize = 2 * MAX_PROCESSES;
+/// Bytes of a request that has its place from the beginning; a larger one takes new memory.
+const SMALL: usize = 4096;
 /// Requests of one session that can be under way at once.
 pub(super) const ASKED: usize = 4;
 /// How often an asker looks whether its request has to be sent again.
@@ -170,11 +173,12 @@ impl Session {
         let client = match self.client.take() {
             Some(client) => client,
             None => {
+                room_for(ROOM)?;
                 let requests = requests(&self.node)?;
                 let make = || {
                     requests
                         .client_builder()
-                        .initial_max_slice_len(4096)
+                        .initial_max_slice_len(SMALL)
                         .allocation_strategy(AllocationStrategy::PowerOfTwo)
                         .backpressure_strategy(BackpressureStrategy::DiscardData)
                         // The store may still read one that was sent again.
@@ -206,6 +210,9 @@ impl Session {
         };
         let bytes =
             postcard::to_extend(&request, bytes).map_err(|e| ipc("encoding a request", e))?;
+        if bytes.len() > SMALL {
+            room_for(ROOM + bytes.len() as u64)?;
+        }
         let answer = self.ask(aim, &bytes, transactions.len() == 1);
         self.scratch = bytes;
         let answers = answer?;

@@ -4,11 +4,13 @@
 use super::{Answer, Asker, Store};
 use crate::graph::STORE;
 use crate::shm::session::Request;
-use crate::shm::{InstanceError, ipc};
+use crate::shm::{InstanceError, ROOM, ipc, room_for};
 use crate::{Refusal, TransactionId};
 use smallvec::{SmallVec, smallvec};
 use std::cmp::Ordering;
 
+/// Bytes of an answer that has its place from the beginning; a larger one takes new memory.
+pub(super) const SMALL: usize = 1024;
 /// Clients whose last requests are remembered.
 const CLIENTS: usize = 1024;
 
@@ -117,6 +119,12 @@ pub(super) fn reply(
     let mut bytes = std::mem::take(scratch);
     bytes.clear();
     let bytes = postcard::to_extend(answers, bytes).map_err(|e| ipc("encoding an answer", e))?;
+    if bytes.len() > SMALL
+        && let Err(error) = room_for(ROOM + bytes.len() as u64)
+    {
+        tracing::warn!("an answer was not sent: {error}");
+        return Ok(());
+    }
     match asker.loan_slice_uninit(bytes.len()) {
         // A client that went away meanwhile does not hear; that is its affair.
         Ok(response) => drop(response.write_from_slice(&bytes).send()),
