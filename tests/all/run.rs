@@ -2,13 +2,16 @@
 //! something goes wrong in the middle of one.
 
 use crate::support::{Program, Run};
+use dsr::{Session, Time, Transaction};
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
+use std::time::Duration;
 
 const CARE_CENTRE: &str = "scenarios/care-centre";
 const PLAZA: &str = "scenarios/plaza";
+const PATIENCE: Duration = Duration::from_secs(20);
 
 fn report(folder: &Path) -> (String, Value) {
     let text = fs::read_to_string(folder.join("report.json")).unwrap();
@@ -200,6 +203,31 @@ fn a_supervisor_that_is_killed_takes_its_processes_with_it_and_the_next_run_clea
     );
     again.succeed();
     run.assert_nothing_is_left();
+}
+
+#[test]
+fn what_was_acknowledged_as_durable_is_there_in_the_next_run_after_all_were_killed() {
+    let state = tempfile::tempdir().unwrap();
+    let arguments = [CARE_CENTRE, "--state", state.path().to_str().unwrap()];
+    let mut run = Run::new("state", &[&arguments[..], &["--durable"]].concat()).start();
+    run.until("mission invite is running");
+    let instance = dsr::Instance::new(run.instance_name()).unwrap();
+    let attach = || Session::attach(&instance, "cortex-graph", PATIENCE).unwrap();
+    let mut transaction = Transaction::new();
+    transaction.create_node("tv", "screen", vec![]);
+    let commit = attach().commit(&transaction, Time::default()).unwrap();
+    assert!(commit.durable);
+    run.kill_supervisor();
+    run.wait_until_no_process_is_left();
+    let mut again = Run::on(run.instance_name(), &arguments).start();
+    again.until("mission invite is running");
+    let snapshot = attach().snapshot().unwrap();
+    assert!(snapshot.find_node_by_name("screen").unwrap().is_some());
+    assert!(snapshot.version() > commit.version);
+    drop(snapshot);
+    again.interrupt();
+    assert_eq!(again.exit_code(), 1);
+    again.assert_nothing_is_left();
 }
 
 #[test]
