@@ -82,8 +82,11 @@ fn get<A: Atomic>(words: &[A], length: u64, bytes: &mut Vec<u8>) -> bool {
     bytes.clear();
     let fits = length <= words.len() as u64 * 8;
     if fits {
-        for word in &words[..(length as usize).div_ceil(8)] {
-            bytes.extend_from_slice(&word.load(Relaxed).to_le_bytes());
+        let words = &words[..(length as usize).div_ceil(8)];
+        bytes.resize(words.len() * 8, 0);
+        let (eights, _) = bytes.as_chunks_mut();
+        for (eight, word) in eights.iter_mut().zip(words) {
+            *eight = word.load(Relaxed).to_le_bytes();
         }
         bytes.truncate(length as usize);
     }

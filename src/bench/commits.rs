@@ -8,6 +8,9 @@ use crate::Failure;
 use dsr::{BareClient, NodeId, Session, Time, Transaction, Value};
 use std::time::{Duration, Instant};
 
+/// Looks at the newest version between two snapshots.
+const LOOKS: usize = 1000;
+
 pub(super) fn set(node: u64, value: f64) -> Transaction {
     let mut transaction = Transaction::new();
     transaction.set(NodeId(1 + node % NODES), "a", value);
@@ -98,10 +101,8 @@ pub(super) fn visible(
         if Instant::now() > deadline {
             return Err(Failure::internal("the stamps stopped coming"));
         }
-        let mut looks = 0..1000;
-        if looks.all(|_| snapshot.is_newest()) {
-            continue;
-        }
+        // A session looks now and then for memory that has come: not just when there is a commit.
+        let _is_over = (0..LOOKS).any(|_| !snapshot.is_newest());
         snapshot = session.snapshot().map_err(Failure::internal)?;
         let read = peer::read_stamp(&snapshot).map_err(Failure::internal)?;
         let seen = peer::clock();

@@ -57,6 +57,7 @@ pub(super) struct Work<'a> {
 }
 
 impl<'a> Work<'a> {
+    #[inline]
     pub(super) fn new(graph: &'a mut Graph, agent: &str, time: Time) -> Result<Self, Refusal> {
         let rights = match &graph.rights {
             Some(rights) if agent != STORE => Some(rights.of(agent)?),

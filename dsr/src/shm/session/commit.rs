@@ -122,7 +122,7 @@ impl Session {
     /// [`CommitError`].
     pub fn commit(&mut self, transaction: &Transaction, time: Time) -> Result<Commit, CommitError> {
         self.sequence += 1;
-        let aim = self.aim()?;
+        let aim = self.known_aim()?;
         let outcome = match self.ask_by_desk(&aim, transaction, time)? {
             Some(outcome) => outcome,
             None => {
@@ -158,7 +158,19 @@ impl Session {
 
     /// The store that is asked now.
     fn aim(&mut self) -> Result<Aim, CommitError> {
-        let (epoch, arena) = self.arena()?.ok_or_else(|| self.no_store())?;
+        let found = self.arena()?.ok_or_else(|| self.no_store())?;
+        self.aim_at(found)
+    }
+
+    /// The store that was there at the last look; who asks it looks whether it still is.
+    fn known_aim(&mut self) -> Result<Aim, CommitError> {
+        match self.arena.newest() {
+            Some(found) => self.aim_at(found),
+            None => self.aim(),
+        }
+    }
+
+    fn aim_at(&mut self, (epoch, arena): (Epoch, Arc<Arena>)) -> Result<Aim, CommitError> {
         let lineage = self.lineage(epoch, &arena)?;
         Ok(Aim {
             epoch,

@@ -154,6 +154,11 @@ impl Session {
         if is_asleep {
             ring(&self.wake_store);
         }
+        // Now that the store has something to do. One that was restarted takes nothing that is for the one before.
+        let newest = self.arena()?.map(|(epoch, _)| epoch);
+        let Some(desk) = self.desk.as_mut().filter(|_| newest == Some(aim.epoch)) else {
+            return Ok(None);
+        };
         // A store that has to wake up first takes longer than is worth looking for.
         let spin = if is_asleep { Duration::ZERO } else { self.spin };
         let mut answer = std::mem::take(&mut desk.answer);
