@@ -11,7 +11,7 @@
 //!
 //! Ids far above the number of nodes have no cell, nor has a node for which there was no room.
 
-use super::{Address, Arena, Root, Word, record};
+use super::{Address, Arena, Root, Word, protocol, record};
 use crate::graph::Writer;
 
 /// Cells of the shortest row.
@@ -25,15 +25,14 @@ pub(crate) fn find<'a>(arena: &'a Arena, root: &Root, id: u64) -> Option<(Addres
     if id >= root.cell_count {
         return None;
     }
-    let cell = arena.from(root.cells)?.get(id as usize)?;
-    let address = cell.load_acquire();
+    let address = protocol::led(arena.from(root.cells)?.get(id as usize)?);
     if address == 0 {
         return None;
     }
     let words = arena.from(address)?;
     let header = words.first_chunk::<{ record::NODE_HEADER }>()?;
-    let right = header[0].load() == id && header[record::SINCE].load() <= root.version;
-    right.then_some((address, words))
+    let marks = (&header[0], &header[record::SINCE]);
+    protocol::is_record_of(marks, id, root.version).then_some((address, words))
 }
 
 /// Makes the row long enough for node `id`, where that is worth it and there is room.
@@ -67,7 +66,7 @@ pub(crate) fn set(arena: &Arena, root: &Root, moved: &mut Vec<(u64, Address)>) {
         if let (Some(row), Some(&(id, address))) = (row, same.last())
             && let Some(cell) = row.get(id as usize)
         {
-            cell.store_release(address);
+            protocol::lead(cell, address);
         }
     }
     moved.clear();

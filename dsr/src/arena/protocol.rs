@@ -128,6 +128,24 @@ pub(super) fn stands<W: Atomic>(promise: &W, holds: impl FnOnce(u64) -> bool) ->
     holds(promise.load(Ordering::Relaxed))
 }
 
+/// Leads from a cell to a node's newest record: once that is written, and before its version is published.
+pub(super) fn lead<W: Atomic>(cell: &W, record: u64) {
+    cell.store(record, Ordering::Release);
+}
+
+/// Where a cell leads.
+#[inline]
+pub(super) fn led<W: Atomic>(cell: &W) -> u64 {
+    cell.load(Ordering::Acquire)
+}
+
+/// Whether the record that a cell leads to is node `id`'s in `version`, by what it says of whose it is and since
+/// when; for as long as that version stands.
+#[inline]
+pub(super) fn is_record_of<W: Atomic>((whose, since): (&W, &W), id: u64, version: u64) -> bool {
+    whose.load(Ordering::Relaxed) == id && since.load(Ordering::Relaxed) <= version
+}
+
 /// The store says whether it sleeps, before it looks for requests one last time.
 pub(crate) fn set_asleep<W: Atomic>(asleep: &W, sleeps: bool) {
     asleep.store(u64::from(sleeps), Ordering::Relaxed);

@@ -175,6 +175,85 @@ fn what_is_read_by_a_lease_that_holds_was_not_written_over() {
     in_every_way(4, Small::new, reuses, reads, |_| ());
 }
 
+/// A node's records in two places, and the cell that leads to the newest.
+struct Celled {
+    small: Small,
+    cell: Modelled,
+    /// Of each: whose it is, since which version, and a value, which is that version.
+    records: [[Modelled; 3]; 2],
+}
+
+impl Celled {
+    /// The node that the cell is of.
+    const NODE: u64 = 7;
+
+    /// Version 1, with the node's record in the first place.
+    fn new() -> Self {
+        let celled = Self {
+            small: Small::new(),
+            cell: Modelled::new(0),
+            records: [(); 2].map(|()| [0; 3].map(Modelled::new)),
+        };
+        celled.write(0, Self::NODE, 1);
+        lead(&celled.cell, 1);
+        celled
+    }
+
+    fn write(&self, place: usize, node: u64, version: u64) {
+        for (word, value) in self.records[place].iter().zip([node, version, version]) {
+            word.store(value, Ordering::Relaxed);
+        }
+    }
+
+    /// Gives the node a record for a version that is then published.
+    fn commit(&self, version: u64, place: usize) {
+        self.write(place, Self::NODE, version);
+        lead(&self.cell, place as u64 + 1);
+        self.small.ring().publish([version, 0]);
+    }
+
+    fn forget_before(&self, version: u64) {
+        revoke(&self.small.oldest, version);
+    }
+
+    /// What a reader of a version makes of the cell, where the node changed in each up to `last`.
+    fn read(&self, version: u64, last: u64) {
+        let Some(place) = led(&self.cell).checked_sub(1) else {
+            return;
+        };
+        let [whose, since, value] = &self.records[place as usize];
+        if is_record_of((whose, since), Self::NODE, version) {
+            let value = value.load(Ordering::Relaxed);
+            if stands(&self.small.oldest, |oldest| version >= oldest) {
+                assert_eq!(value, version.min(last));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_cell_shows_the_record_of_the_version_also_where_the_next_takes_the_place_of_the_first() {
+    let commits = |celled: &Celled| {
+        celled.commit(2, 1);
+        celled.forget_before(2);
+        celled.commit(3, 0);
+    };
+    let reads = |celled: &Celled| celled.read(celled.small.ring().head(), 3);
+    in_every_way(3, Celled::new, commits, reads, |_| ());
+}
+
+#[test]
+fn a_cell_shows_nothing_of_another_node_that_takes_the_place_of_its_record() {
+    let commits = |celled: &Celled| {
+        celled.commit(2, 1);
+        celled.forget_before(2);
+        celled.write(0, Celled::NODE + 1, 3);
+        celled.small.ring().publish([3, 0]);
+    };
+    let reads = |celled: &Celled| celled.read(celled.small.ring().head(), 2);
+    in_every_way(3, Celled::new, commits, reads, |_| ());
+}
+
 /// A request that was sent, a store that may sleep, and who saw what.
 struct Asking {
     request: Modelled,
