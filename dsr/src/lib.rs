@@ -50,7 +50,7 @@ pub use shm::{
 };
 pub use snapshot::{
     Attribute, Edge, Edges, Element, Neighbors, Node, NodeIds, Snapshot, TransformError,
-    TripleCount, TypedIds, ValueRange,
+    TripleCount, TypedEdges, TypedIds, ValueRange,
 };
 pub use state::{State, StateError};
 pub use time::Time;

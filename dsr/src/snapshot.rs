@@ -11,7 +11,7 @@ mod scan;
 pub use element::{Attribute, Edge, Element, Node};
 pub use geometry::TransformError;
 pub use petgraph::{Edges, Neighbors};
-pub use scan::{NodeIds, TypedIds};
+pub use scan::{NodeIds, TypedEdges, TypedIds};
 
 use crate::arena::record;
 use crate::arena::tree::{self, Key};
@@ -221,25 +221,34 @@ impl Snapshot {
         Ok(Node::at(self, address, words, id, type_id))
     }
 
+    /// Where a node's record is, and the words from its first on; not yet known to be genuine.
+    #[inline]
+    fn record(&self, id: NodeId) -> Result<Option<(Address, &[Word])>, Address> {
+        match cells::find(&self.arena, &self.root, id.0) {
+            Some(found) => Ok(Some(found)),
+            None => self.record_in_trie(id),
+        }
+    }
+
+    #[inline(never)]
+    fn record_in_trie(&self, id: NodeId) -> Result<Option<(Address, &[Word])>, Address> {
+        let found = trie::find(&self.arena, self.root.nodes, id.0)?;
+        Ok(found.map(|address| (address, self.arena.from(address).unwrap_or(&[]))))
+    }
+
     /// The node of that id, if it is there.
     ///
     /// # Errors
     /// [`ReadError`], as for every read of a snapshot.
     #[inline]
     pub fn find_node(&self, id: NodeId) -> Result<Option<Node<'_>>, ReadError> {
-        let found = match cells::find(&self.arena, &self.root, id.0) {
-            Some((address, words)) => self.node_at(address, words),
-            None => match trie::find(&self.arena, self.root.nodes, id.0) {
-                Ok(Some(address)) => {
-                    let words = self.arena.from(address).unwrap_or(&[]);
-                    self.node_at(address, words)
-                }
-                Ok(None) => {
-                    self.check()?;
-                    return Ok(None);
-                }
-                Err(address) => Err(address),
-            },
+        let found = match self.record(id) {
+            Ok(Some((address, words))) => self.node_at(address, words),
+            Ok(None) => {
+                self.check()?;
+                return Ok(None);
+            }
+            Err(address) => Err(address),
         };
         match found {
             Ok(node) => {
@@ -394,22 +403,10 @@ impl Snapshot {
 
     /// The edges of a label, by ascending source and target, with the exact types of both: reads no
     /// node.
-    pub fn typed_edges_of_label(
-        &self,
-        label: LabelId,
-    ) -> impl Iterator<Item = Result<(EdgeKey, [TypeId; 2]), ReadError>> {
+    pub fn typed_edges_of_label(&self, label: LabelId) -> TypedEdges<'_> {
         let entry = record::directory_entry(&self.arena, self.root.labels, label.0);
         let root = self.genuine(entry).map(|(tree, _)| tree);
-        self.scan(root, [0, 0], [u64::MAX, u64::MAX])
-            .map(move |entry| {
-                let ([from, to], ends) = entry?;
-                let key = EdgeKey {
-                    from: NodeId(from),
-                    label,
-                    to: NodeId(to),
-                };
-                Ok((key, record::types_of(ends).map(TypeId)))
-            })
+        TypedEdges::new(self.scan(root, [0, 0], [u64::MAX, u64::MAX]), label)
     }
 
     /// How many edges have a label.

@@ -7,7 +7,7 @@ mod working;
 
 pub use working::WorkingGraph;
 
-use crate::matching::{Compiler, Environment, Frame, Link, Plan, Planned, Slot, Slots};
+use crate::matching::{Ahead, Compiler, Environment, Frame, Link, Plan, Planned, Slot, Slots};
 use crate::{Grammar, MatchError, PatternEdge, Rule, SEARCH_LIMIT};
 use dsr::{EdgeKey, NodeId, Schema, Snapshot, TypeId};
 use std::sync::Arc;
@@ -65,8 +65,8 @@ pub struct Rewriter {
     /// The slots that were given last, and the plan for them.
     plan: Option<Arc<Plan>>,
     environment: Environment,
-    /// What the search looks up, by slot: kept only to be filled again.
-    nodes: Vec<Option<NodeId>>,
+    /// What the search reads ahead, by step: kept only to be filled again.
+    ahead: Vec<Ahead>,
     unlinks: Vec<Link>,
     deletes: Vec<usize>,
     retypes: Vec<(usize, TypeId)>,
@@ -101,7 +101,8 @@ impl Rewriter {
         }
         let mut rewriter = Self {
             environment: Environment::new(0, SEARCH_LIMIT),
-            nodes: vec![None; query.variables.len()],
+            // A plan has no more steps than variables.
+            ahead: vec![Ahead::default(); query.variables.len()],
             planned: Planned::new(query),
             plan: None,
             unlinks: Vec::new(),
@@ -206,7 +207,7 @@ impl Rewriter {
         };
         let found = frame.first(&mut Slots {
             environment: &mut self.environment,
-            nodes: &mut self.nodes,
+            ahead: &mut self.ahead,
         });
         if !found? {
             return Ok(false);

@@ -2,7 +2,7 @@
 //! reaches. This file guarantees that a block is given out again only after the versions that
 //! reach it were declared unreadable.
 
-use super::{Address, Arena, FIRST_BLOCK, Word};
+use super::{Address, Arena, FIRST_BLOCK};
 use crate::shm::Segment;
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::VecDeque;
@@ -58,8 +58,7 @@ impl Growth for HeapGrowth {
         if index >= arena.capacity() {
             return Err(Full);
         }
-        let words = (0..arena.segment_words()).map(|_| Word::default());
-        arena.attach(index, Segment::on_heap(words.collect()));
+        arena.attach(index, Segment::of_zeros(arena.segment_words()));
         Ok(())
     }
     fn reserve(&mut self, _: usize, _: usize, _: usize) -> Result<(), Full> {

@@ -48,6 +48,7 @@ impl Word {
     pub(crate) fn store(&self, value: u64) {
         self.put(value, Ordering::Relaxed);
     }
+    #[inline]
     pub(crate) fn load_acquire(&self) -> u64 {
         self.0.load(Ordering::Acquire)
     }

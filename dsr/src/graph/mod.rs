@@ -130,8 +130,9 @@ pub struct Graph {
 impl Graph {
     /// An empty graph on the heap of this process.
     pub fn in_memory(schema: Schema) -> Self {
-        // 1 MiB segments, 64 GiB at the most.
-        let arena = Arc::new(Arena::new(1 << 16, 17));
+        // 16 MiB segments, 64 GiB at the most. A segment has room for the cells of half a million
+        // nodes; what is not used of it takes no memory.
+        let arena = Arc::new(Arena::new(1 << 12, 21));
         // The heap does not refuse; where it is exhausted the process ends.
         Self::on(arena, Box::new(HeapGrowth), schema, Epoch(1)).unwrap_or_else(|Full| {
             unreachable!("the first segment of an arena on the heap is always there")

@@ -28,6 +28,13 @@ impl Segment {
         }
     }
 
+    /// So many words of 0, of this process alone. Those that nobody touches take no memory.
+    pub(crate) fn of_zeros(len: usize) -> Self {
+        let words = Arc::<[Word]>::new_zeroed_slice(len);
+        // SAFETY: a word is an `AtomicU64` and nothing else, for which all bits 0 are a value.
+        Self::on_heap(unsafe { words.assume_init() })
+    }
+
     /// Words that `owner` keeps mapped.
     ///
     /// # Safety

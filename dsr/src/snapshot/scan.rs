@@ -3,8 +3,8 @@
 
 use super::{Node, Snapshot};
 use crate::arena::tree::{self, Entry, Key, Range};
-use crate::arena::{Address, ReadError, record};
-use crate::{LabelId, NodeId, TypeId};
+use crate::arena::{Address, ReadError, Word, record};
+use crate::{EdgeKey, LabelId, NodeId, TypeId};
 
 /// Walks a part of a tree.
 #[derive(Debug)]
@@ -98,6 +98,37 @@ impl Iterator for NodeIds<'_> {
     }
 }
 
+/// Edges of a label, with the exact types of source and target, one after another.
+#[derive(Debug)]
+pub struct TypedEdges<'a> {
+    scan: Scan<'a>,
+    label: LabelId,
+}
+
+impl<'a> TypedEdges<'a> {
+    pub(super) fn new(scan: Scan<'a>, label: LabelId) -> Self {
+        Self { scan, label }
+    }
+}
+
+impl Iterator for TypedEdges<'_> {
+    type Item = Result<(EdgeKey, [TypeId; 2]), ReadError>;
+
+    #[inline]
+    fn next(&mut self) -> Option<Self::Item> {
+        let ([from, to], ends) = match self.scan.next()? {
+            Ok(entry) => entry,
+            Err(error) => return Some(Err(error)),
+        };
+        let key = EdgeKey {
+            from: NodeId(from),
+            label: self.label,
+            to: NodeId(to),
+        };
+        Some(Ok((key, record::types_of(ends).map(TypeId))))
+    }
+}
+
 /// Ids of nodes at the other ends of edges, with their exact types, one after another.
 #[derive(Debug)]
 pub struct TypedIds<'a>(Scan<'a>);
@@ -116,34 +147,121 @@ impl<'a> Node<'a> {
     /// Where the edges of a label that start here end, by ascending id, with the nodes' exact types:
     /// reads no other node.
     pub fn typed_targets_of(&self, label: LabelId) -> TypedIds<'a> {
-        TypedIds(self.adjacent(4, [label.0; 2]))
+        TypedIds(self.adjacent(TARGETS, [label.0; 2]))
     }
 
     /// Where the edges of a label that end here start, by ascending id, with the nodes' exact types:
     /// reads no other node.
     pub fn typed_sources_of(&self, label: LabelId) -> TypedIds<'a> {
-        TypedIds(self.adjacent(5, [label.0; 2]))
+        TypedIds(self.adjacent(SOURCES, [label.0; 2]))
     }
+}
 
-    /// Whether an edge of the label leads from here to that node.
+/// Which word of a node's record leads to the edges that start there.
+const TARGETS: usize = 4;
+/// Which word of a node's record leads to the edges that end there.
+const SOURCES: usize = 5;
+
+impl Snapshot {
+    /// Where edges of a label that start at a node end, with the nodes' exact types: of those from an id
+    /// on, in ascending order, some that lie together, each given to `visit`. The id from which to go on,
+    /// or `None` where there are no more. What is visited is known to be genuine only where this gives no
+    /// error.
     ///
     /// # Errors
     /// [`ReadError`].
-    pub fn has_target(&self, label: LabelId, to: NodeId) -> Result<bool, ReadError> {
-        self.has_end(4, label, to)
+    #[inline]
+    pub fn visit_targets(
+        &self,
+        node: NodeId,
+        label: LabelId,
+        from: NodeId,
+        visit: impl FnMut(NodeId, TypeId),
+    ) -> Result<Option<NodeId>, ReadError> {
+        self.visit_ends(TARGETS, node, label, from, visit)
     }
 
-    /// Whether an edge of the label leads from that node to here.
+    /// As [`Self::visit_targets`], where edges start that end at the node.
     ///
     /// # Errors
     /// [`ReadError`].
-    pub fn has_source(&self, label: LabelId, from: NodeId) -> Result<bool, ReadError> {
-        self.has_end(5, label, from)
+    #[inline]
+    pub fn visit_sources(
+        &self,
+        node: NodeId,
+        label: LabelId,
+        from: NodeId,
+        visit: impl FnMut(NodeId, TypeId),
+    ) -> Result<Option<NodeId>, ReadError> {
+        self.visit_ends(SOURCES, node, label, from, visit)
     }
 
-    fn has_end(&self, tree: usize, label: LabelId, other: NodeId) -> Result<bool, ReadError> {
+    #[inline]
+    fn visit_ends(
+        &self,
+        tree: usize,
+        node: NodeId,
+        label: LabelId,
+        from: NodeId,
+        mut visit: impl FnMut(NodeId, TypeId),
+    ) -> Result<Option<NodeId>, ReadError> {
+        let label = u64::from(label.0);
+        let root = self.tree_of(node, tree);
+        let leaf = root.and_then(|root| tree::leaf(&self.arena, root, [label, from.0]));
+        let (entries, next) = match leaf {
+            Ok(leaf) => leaf,
+            Err(address) => return Err(self.broken(address)),
+        };
+        let mut more = next;
+        for [key, id, end] in entries {
+            if key.load() != label {
+                more = None;
+                break;
+            }
+            visit(NodeId(id.load()), TypeId(record::other_type(end.load())));
+        }
+        self.check()?;
+        // Only upwards, so that a walk ends in damaged memory, too.
+        let more = more.filter(|next| next[0] == label && next[1] > from.0);
+        Ok(more.map(|next| NodeId(next[1])))
+    }
+
+    /// Whether the edge is there, by what is known where it starts.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn has_edge(&self, key: EdgeKey) -> Result<bool, ReadError> {
+        self.has_end(TARGETS, key.from, key.label, key.to)
+    }
+
+    /// Whether the edge is there, by what is known where it ends.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn has_edge_into(&self, key: EdgeKey) -> Result<bool, ReadError> {
+        self.has_end(SOURCES, key.to, key.label, key.from)
+    }
+
+    #[inline]
+    fn has_end(
+        &self,
+        tree: usize,
+        node: NodeId,
+        label: LabelId,
+        other: NodeId,
+    ) -> Result<bool, ReadError> {
         let key = [u64::from(label.0), other.0];
-        let found = tree::find(&self.snapshot.arena, self.word(tree)?, key);
-        Ok(self.snapshot.genuine(found)?.is_some())
+        let root = self.tree_of(node, tree);
+        let found = root.and_then(|root| tree::find(&self.arena, root, key));
+        Ok(self.genuine(found)?.is_some())
+    }
+
+    /// A node's tree of edges, empty where there is no such node; not yet known to be genuine.
+    #[inline]
+    fn tree_of(&self, node: NodeId, tree: usize) -> Result<Address, Address> {
+        match self.record(node)? {
+            Some((address, words)) => words.get(tree).map(Word::load).ok_or(address),
+            None => Ok(0),
+        }
     }
 }

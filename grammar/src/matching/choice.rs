@@ -95,7 +95,7 @@ impl Choices {
         let slot = self.first + index;
         let nodes = variable.nodes(slot, host, environment)?;
         let mut try_node = |candidate: Candidate| {
-            environment.spend()?;
+            environment.spend(1)?;
             let Candidate::Node(id, exact) = candidate else {
                 return Ok(None);
             };

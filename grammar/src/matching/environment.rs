@@ -58,12 +58,12 @@ impl Environment {
         self.slots.resize(slots, Slot::Unbound);
     }
 
-    /// Counts one more node that is tried.
+    /// Counts so many more nodes that are tried.
     #[inline]
-    pub(crate) fn spend(&mut self) -> Result<(), Interrupt> {
+    pub(crate) fn spend(&mut self, nodes: u64) -> Result<(), Interrupt> {
         self.left = self
             .left
-            .checked_sub(1)
+            .checked_sub(nodes)
             .ok_or(Interrupt::Limit(self.limit))?;
         Ok(())
     }

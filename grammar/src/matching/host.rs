@@ -8,6 +8,15 @@ use dsr::{
     ValueRange, Version,
 };
 
+/// Which way edges are followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Way {
+    /// From their sources to their targets.
+    Out,
+    /// From their targets to their sources.
+    In,
+}
+
 /// A graph in which patterns are looked for.
 pub(crate) trait Host {
     /// A node that was looked up.
@@ -34,19 +43,13 @@ pub(crate) trait Host {
     fn find(&self, id: NodeId) -> Result<Option<Self::Node<'_>>, ReadError>;
     /// The node's exact type.
     fn type_of(&self, node: Self::Node<'_>) -> TypeId;
-    /// Whether an edge of the label leads from the node to that of the id.
-    fn has_target(
+    /// Whether a node has an edge of the label to or from another, by what is known at that node.
+    fn has_end(
         &self,
-        from: Self::Node<'_>,
+        way: Way,
+        of: NodeId,
         label: LabelId,
-        to: NodeId,
-    ) -> Result<bool, ReadError>;
-    /// Whether an edge of the label leads to the node from that of the id.
-    fn has_source(
-        &self,
-        to: Self::Node<'_>,
-        label: LabelId,
-        from: NodeId,
+        other: NodeId,
     ) -> Result<bool, ReadError>;
     fn node_value(
         &self,
@@ -59,6 +62,17 @@ pub(crate) trait Host {
     fn targets<'a>(&'a self, from: Self::Node<'a>, label: LabelId) -> Self::Ends<'a>;
     /// Where the edges of a label that end at a node start, by ascending id.
     fn sources<'a>(&'a self, to: Self::Node<'a>, label: LabelId) -> Self::Ends<'a>;
+    /// Gives to `visit` some of the nodes at the other ends of a node's edges, of those from an id on by
+    /// ascending id; the id from which to go on, or `None` where there are no more. Without an error
+    /// only, what was visited is there.
+    fn visit_ends(
+        &self,
+        way: Way,
+        of: NodeId,
+        label: LabelId,
+        from: NodeId,
+        visit: impl FnMut(NodeId, TypeId),
+    ) -> Result<Option<NodeId>, ReadError>;
     /// The nodes of exactly this type.
     fn members(&self, exact: TypeId) -> Self::Ids<'_>;
     /// The edges of a label.
@@ -73,10 +87,7 @@ pub(crate) trait Host {
     fn triples(&self, label: LabelId, visit: &mut dyn FnMut(TripleCount)) -> Result<(), ReadError>;
 
     fn has_edge(&self, key: EdgeKey) -> Result<bool, ReadError> {
-        match self.find(key.from)? {
-            Some(from) => self.has_target(from, key.label, key.to),
-            None => Ok(false),
-        }
+        self.has_end(Way::Out, key.from, key.label, key.to)
     }
 }
 
@@ -84,7 +95,7 @@ impl Host for Snapshot {
     type Node<'a> = dsr::Node<'a>;
     type Ids<'a> = dsr::NodeIds<'a>;
     type Ends<'a> = dsr::TypedIds<'a>;
-    type Edges<'a> = Box<dyn Iterator<Item = Result<(EdgeKey, [TypeId; 2]), ReadError>> + 'a>;
+    type Edges<'a> = dsr::TypedEdges<'a>;
 
     fn version(&self) -> Version {
         self.version()
@@ -99,22 +110,19 @@ impl Host for Snapshot {
         node.type_id()
     }
 
-    fn has_target(
+    #[inline]
+    fn has_end(
         &self,
-        from: Self::Node<'_>,
+        way: Way,
+        of: NodeId,
         label: LabelId,
-        to: NodeId,
+        other: NodeId,
     ) -> Result<bool, ReadError> {
-        from.has_target(label, to)
-    }
-
-    fn has_source(
-        &self,
-        to: Self::Node<'_>,
-        label: LabelId,
-        from: NodeId,
-    ) -> Result<bool, ReadError> {
-        to.has_source(label, from)
+        let key = |from, to| EdgeKey { from, label, to };
+        match way {
+            Way::Out => self.has_edge(key(of, other)),
+            Way::In => self.has_edge_into(key(other, of)),
+        }
     }
 
     fn node_value(
@@ -140,12 +148,27 @@ impl Host for Snapshot {
         to.typed_sources_of(label)
     }
 
+    #[inline]
+    fn visit_ends(
+        &self,
+        way: Way,
+        of: NodeId,
+        label: LabelId,
+        from: NodeId,
+        visit: impl FnMut(NodeId, TypeId),
+    ) -> Result<Option<NodeId>, ReadError> {
+        match way {
+            Way::Out => self.visit_targets(of, label, from, visit),
+            Way::In => self.visit_sources(of, label, from, visit),
+        }
+    }
+
     fn members(&self, exact: TypeId) -> Self::Ids<'_> {
         self.ids_of_type(exact)
     }
 
     fn edges(&self, label: LabelId) -> Self::Edges<'_> {
-        Box::new(self.typed_edges_of_label(label))
+        self.typed_edges_of_label(label)
     }
 
     fn by_value(&self, attribute: AttributeId, range: &ValueRange) -> Self::Ids<'_> {

@@ -2,6 +2,7 @@
 //!
 //! Guarantee: matching is injective and subtype-aware, and reads the snapshot in place.
 
+mod ahead;
 mod candidates;
 mod choice;
 mod domain;
@@ -26,10 +27,11 @@ pub use obstacle::{End, Obstacle};
 pub use search::Matches;
 pub use watch::{MatchDelta, RuleMatch, Watch};
 
+pub(crate) use ahead::Ahead;
 pub(crate) use choice::Choices;
 pub(crate) use domain::Domain as MatchDomain;
 pub(crate) use environment::{Environment, Interrupt};
-pub(crate) use host::Host;
+pub(crate) use host::{Host, Way};
 pub(crate) use obstacle::words;
 pub(crate) use plan::Plan;
 pub(crate) use planned::Planned;

@@ -3,7 +3,9 @@
 //! Guarantee: every slot that is not given is bound by exactly one step, and each link and
 //! condition is tested at the first step after which all that it reads is bound.
 
-use super::program::{Link, Test};
+use super::ahead::Ends;
+use super::environment::Environment;
+use super::program::{Link, Slot, Test};
 use super::query::Query;
 use super::statistics::Statistics;
 use crate::Comparison;
@@ -345,6 +347,23 @@ impl Planner<'_> {
             tests: self.tests_of(bound, Some(before)).collect(),
             candidates: extension.candidates,
             passing: extension.passing,
+        }
+    }
+}
+
+impl Step {
+    /// Whether nothing is tested after it.
+    pub(crate) fn is_free(&self) -> bool {
+        self.links.is_empty() && self.tests.is_empty()
+    }
+
+    /// Puts a candidate into its slots.
+    #[inline]
+    pub(crate) fn bind(&self, candidate: Ends, environment: &mut Environment) {
+        for (slot, id) in self.binds.into_iter().zip(candidate) {
+            if let Some(slot) = slot {
+                environment[slot] = Slot::Node(id);
+            }
         }
     }
 }

@@ -4,17 +4,21 @@
 //! determine; matches are injective.
 
 use super::MatchError;
+use super::ahead::Ahead;
 use super::candidates::{Candidate, Candidates};
 use super::environment::{Environment, Interrupt, node};
-use super::host::Host;
+use super::host::{Host, Way};
 use super::plan::{Plan, Source, Step, plan};
 use super::program::{Link, Slot};
 use super::query::{Problem, Query};
 use super::statistics::Statistics;
 use crate::Binding;
-use dsr::{NodeId, ReadError, Snapshot, TypeId};
+use dsr::{EdgeKey, NodeId, ReadError, Snapshot, TypeId};
 use std::fmt;
 use std::sync::Arc;
+
+/// So many candidates are read together where they come from no link.
+const TOGETHER: usize = 32;
 
 /// A search under way.
 #[derive(Debug)]
@@ -22,9 +26,14 @@ pub(crate) struct Search<'h, H: Host> {
     host: &'h H,
     problem: Problem,
     plan: Arc<Plan>,
-    /// By slot, the nodes that were looked up.
-    nodes: Vec<Option<H::Node<'h>>>,
-    levels: Vec<Candidates<'h, H>>,
+    /// By step, what was read of its candidates.
+    ahead: Vec<Ahead>,
+    /// By step, where its candidates come from, if not along a link.
+    others: Vec<Option<Candidates<'h, H>>>,
+    /// The step that is tried.
+    depth: usize,
+    /// Whether nothing is tested after the last step.
+    free: bool,
     /// By step, how many candidates there were, and how many of them passed.
     seen: Vec<[u64; 2]>,
     state: State,
@@ -42,9 +51,11 @@ impl<'h, H: Host> Search<'h, H> {
     pub(crate) fn new(host: &'h H, problem: Problem, plan: Arc<Plan>) -> Self {
         Self {
             host,
-            nodes: vec![None; problem.query.variables.len()],
             problem,
-            levels: Vec::with_capacity(plan.steps.len()),
+            ahead: vec![Ahead::default(); plan.steps.len()],
+            others: plan.steps.iter().map(|_| None).collect(),
+            depth: 0,
+            free: plan.steps.last().is_some_and(Step::is_free),
             seen: vec![[0; 2]; plan.steps.len()],
             plan,
             state: State::Fresh,
@@ -53,7 +64,20 @@ impl<'h, H: Host> Search<'h, H> {
 
     /// Goes to the next match; `false` where there is none. After that, and after an error, there
     /// is none any more.
+    #[inline]
     pub(crate) fn advance(&mut self) -> Result<bool, Interrupt> {
+        if self.free
+            && self.state == State::Running
+            && let (Some(step), Some(ahead)) = (self.plan.steps.last(), self.ahead.last_mut())
+            && let Some(ends) = ahead.next()
+            && let Some([_, passed]) = self.seen.last_mut()
+        {
+            let environment = &mut self.problem.environment;
+            environment.renew();
+            step.bind(ends, environment);
+            *passed += 1;
+            return Ok(true);
+        }
         let found = self.try_advance();
         if !matches!(found, Ok(true)) {
             self.state = State::Done;
@@ -66,10 +90,12 @@ impl<'h, H: Host> Search<'h, H> {
             host,
             problem: Problem { query, environment },
             plan,
-            nodes,
-            levels,
+            ahead,
+            others,
+            depth,
             seen,
             state,
+            free: _,
         } = self;
         let frame = Frame {
             host: *host,
@@ -77,7 +103,7 @@ impl<'h, H: Host> Search<'h, H> {
             plan,
         };
         environment.renew();
-        let mut slots = Slots { environment, nodes };
+        let mut slots = Slots { environment, ahead };
         match state {
             State::Done => return Ok(false),
             State::Running => {}
@@ -89,26 +115,35 @@ impl<'h, H: Host> Search<'h, H> {
                 if plan.steps.is_empty() {
                     return Ok(true);
                 }
-                levels.push(frame.candidates(0, &mut slots)?);
+                others[0] = frame.open(0, &mut slots);
             }
         }
-        while let Some(depth) = levels.len().checked_sub(1) {
-            let Some(candidate) = levels[depth].next() else {
-                levels.pop();
-                continue;
+        loop {
+            let Some(step) = plan.steps.get(*depth) else {
+                return Ok(false);
             };
-            slots.environment.spend()?;
-            seen[depth][0] += 1;
-            if !frame.accept(depth, candidate?, &mut slots)? {
-                continue;
+            if let Some(ends) = slots.ahead[*depth].next() {
+                step.bind(ends, slots.environment);
+                if !frame.passes(step, &mut slots)? {
+                    continue;
+                }
+                seen[*depth][1] += 1;
+                if *depth + 1 == plan.steps.len() {
+                    return Ok(true);
+                }
+                *depth += 1;
+                if let Some(other) = frame.open(*depth, &mut slots) {
+                    others[*depth] = Some(other);
+                }
+            } else if let Some(from) = slots.ahead[*depth].read_on() {
+                let (other, seen) = (&mut others[*depth], &mut seen[*depth][0]);
+                *seen += frame.read(*depth, from, other, &mut slots)?;
+            } else if let Some(before) = depth.checked_sub(1) {
+                *depth = before;
+            } else {
+                return Ok(false);
             }
-            seen[depth][1] += 1;
-            if depth + 1 == plan.steps.len() {
-                return Ok(true);
-            }
-            levels.push(frame.candidates(depth + 1, &mut slots)?);
         }
-        Ok(false)
     }
 
     /// By step, how many candidates there were so far, and how many of them passed.
@@ -128,47 +163,11 @@ impl<'h, H: Host> Search<'h, H> {
     }
 }
 
-/// What the slots of a search stand for, and those of the nodes in them that were looked up.
-pub(crate) struct Slots<'s, 'h, H: Host + 'h> {
+/// What a search fills.
+pub(crate) struct Slots<'s> {
     pub(crate) environment: &'s mut Environment,
-    /// By slot of a variable.
-    pub(crate) nodes: &'s mut [Option<H::Node<'h>>],
-}
-
-impl<'h, H: Host> Slots<'_, 'h, H> {
-    fn put(&mut self, slot: usize, id: NodeId) {
-        self.environment[slot] = Slot::Node(id);
-        self.nodes[slot] = None;
-    }
-
-    /// The node in a slot, looked up once.
-    fn node(&mut self, host: &'h H, slot: usize) -> Result<Option<H::Node<'h>>, ReadError> {
-        if self.nodes[slot].is_none()
-            && let Some(id) = node(self.environment, slot)
-        {
-            self.nodes[slot] = host.find(id)?;
-        }
-        Ok(self.nodes[slot])
-    }
-
-    /// Whether the link is in the graph.
-    fn joined(&mut self, host: &'h H, link: &Link) -> Result<bool, ReadError> {
-        let (Some(from), Some(label), Some(to)) = (
-            node(self.environment, link.from),
-            link.label,
-            node(self.environment, link.to),
-        ) else {
-            return Ok(false);
-        };
-        // Either end knows; that which was looked up before costs less.
-        if let (None, Some(to)) = (self.nodes[link.from], self.nodes[link.to]) {
-            return host.has_source(to, label, from);
-        }
-        match self.node(host, link.from)? {
-            Some(from) => host.has_target(from, label, to),
-            None => Ok(false),
-        }
-    }
+    /// By step, what was read of its candidates.
+    pub(crate) ahead: &'s mut [Ahead],
 }
 
 /// What a search goes by.
@@ -180,25 +179,32 @@ pub(crate) struct Frame<'h, 'p, H: Host> {
 
 impl<'h, H: Host> Frame<'h, '_, H> {
     /// Puts the first match into the slots, those that are given kept.
-    pub(crate) fn first(&self, slots: &mut Slots<'_, 'h, H>) -> Result<bool, Interrupt> {
+    pub(crate) fn first(&self, slots: &mut Slots<'_>) -> Result<bool, Interrupt> {
         Ok(self.given_holds(slots)? && self.descend(0, slots)?)
     }
 
-    fn descend(&self, depth: usize, slots: &mut Slots<'_, 'h, H>) -> Result<bool, Interrupt> {
+    fn descend(&self, depth: usize, slots: &mut Slots<'_>) -> Result<bool, Interrupt> {
         if depth == self.plan.steps.len() {
             return Ok(true);
         }
-        for candidate in self.candidates(depth, slots)? {
-            slots.environment.spend()?;
-            if self.accept(depth, candidate?, slots)? && self.descend(depth + 1, slots)? {
-                return Ok(true);
+        let step = &self.plan.steps[depth];
+        let mut other = self.open(depth, slots);
+        loop {
+            if let Some(ends) = slots.ahead[depth].next() {
+                step.bind(ends, slots.environment);
+                if self.passes(step, slots)? && self.descend(depth + 1, slots)? {
+                    return Ok(true);
+                }
+            } else if let Some(from) = slots.ahead[depth].read_on() {
+                self.read(depth, from, &mut other, slots)?;
+            } else {
+                return Ok(false);
             }
         }
-        Ok(false)
     }
 
     /// What can be said of the slots that are bound from the start.
-    fn given_holds(&self, slots: &mut Slots<'_, 'h, H>) -> Result<bool, Interrupt> {
+    fn given_holds(&self, slots: &mut Slots<'_>) -> Result<bool, Interrupt> {
         let Self { host, query, plan } = self;
         for (index, &slot) in plan.given.iter().enumerate() {
             let taken = slots.environment[slot];
@@ -206,28 +212,39 @@ impl<'h, H: Host> Frame<'h, '_, H> {
             if others.any(|&other| slots.environment[other] == taken) {
                 return Ok(false);
             }
-            slots.nodes[slot] = None;
-            let exact = slots.node(host, slot)?.map(|node| host.type_of(node));
+            let node = node(slots.environment, slot).map(|id| host.find(id));
+            let exact = node.transpose()?.flatten().map(|node| host.type_of(node));
             if !exact.is_some_and(|exact| query.domains[slot].contains(exact)) {
                 return Ok(false);
             }
         }
-        self.passes(&plan.links, &plan.tests, slots)
-    }
-
-    /// Whether these links and conditions hold.
-    fn passes(
-        &self,
-        links: &[usize],
-        tests: &[usize],
-        slots: &mut Slots<'_, 'h, H>,
-    ) -> Result<bool, Interrupt> {
-        for &link in links {
-            let link = &self.query.links[link];
-            if slots.joined(self.host, link)? == link.negated {
+        for &link in &plan.links {
+            if !self.link_holds(&query.links[link], Way::Out, slots)? {
                 return Ok(false);
             }
         }
+        self.tests_hold(&plan.tests, slots)
+    }
+
+    /// Whether the links and conditions hold that are looked at after a step.
+    #[inline]
+    fn passes(&self, step: &Step, slots: &mut Slots<'_>) -> Result<bool, Interrupt> {
+        for &link in &step.links {
+            let link = &self.query.links[link];
+            // Either end knows, but what the step has just bound was never looked at.
+            let way = if step.binds[0] == Some(link.from) {
+                Way::In
+            } else {
+                Way::Out
+            };
+            if !self.link_holds(link, way, slots)? {
+                return Ok(false);
+            }
+        }
+        Ok(step.tests.is_empty() || self.tests_hold(&step.tests, slots)?)
+    }
+
+    fn tests_hold(&self, tests: &[usize], slots: &mut Slots<'_>) -> Result<bool, Interrupt> {
         for &test in tests {
             if !self.query.tests[test].holds(self.host, slots.environment)? {
                 return Ok(false);
@@ -236,27 +253,25 @@ impl<'h, H: Host> Frame<'h, '_, H> {
         Ok(true)
     }
 
-    fn candidates(
-        &self,
-        depth: usize,
-        slots: &mut Slots<'_, 'h, H>,
-    ) -> Result<Candidates<'h, H>, ReadError> {
+    /// Whether the link is there, or is not where it must not be.
+    fn link_holds(&self, link: &Link, way: Way, slots: &Slots<'_>) -> Result<bool, ReadError> {
+        let [from, to] = [link.from, link.to].map(|slot| node(slots.environment, slot));
+        let (Some(from), Some(label), Some(to)) = (from, link.label, to) else {
+            return Ok(link.negated);
+        };
+        let there = match way {
+            Way::Out => self.host.has_end(way, from, label, to)?,
+            Way::In => self.host.has_end(way, to, label, from)?,
+        };
+        Ok(there != link.negated)
+    }
+
+    /// Begins a step; where it does not follow a link, what it finds comes back.
+    fn open(&self, depth: usize, slots: &mut Slots<'_>) -> Option<Candidates<'h, H>> {
         let Self { host, query, .. } = *self;
-        Ok(match self.plan.steps[depth].source {
-            Source::Out { link } => {
-                let Link { from, label, .. } = query.links[link];
-                match (slots.node(host, from)?, label) {
-                    (Some(from), Some(label)) => Candidates::Ends(host.targets(from, label)),
-                    _ => Candidates::Nothing,
-                }
-            }
-            Source::In { link } => {
-                let Link { to, label, .. } = query.links[link];
-                match (slots.node(host, to)?, label) {
-                    (Some(to), Some(label)) => Candidates::Ends(host.sources(to, label)),
-                    _ => Candidates::Nothing,
-                }
-            }
+        slots.ahead[depth].begin();
+        Some(match self.plan.steps[depth].source {
+            Source::Out { .. } | Source::In { .. } => return None,
             Source::Nodes { slot } => Candidates::members(host, query.domains[slot].types()),
             Source::Edges { link } => match query.links[link].label {
                 Some(label) => Candidates::Edges(host.edges(label)),
@@ -269,45 +284,100 @@ impl<'h, H: Host> Frame<'h, '_, H> {
         })
     }
 
-    /// Puts a candidate into its slots and tests what can be tested now.
-    fn accept(
+    /// Reads some candidates of a step ahead, those along a link from a node on, and keeps what is of the
+    /// right type and in no other slot; how many there were.
+    #[inline]
+    fn read(
         &self,
         depth: usize,
-        candidate: Candidate,
-        slots: &mut Slots<'_, 'h, H>,
-    ) -> Result<bool, Interrupt> {
+        from: NodeId,
+        other: &mut Option<Candidates<'h, H>>,
+        slots: &mut Slots<'_>,
+    ) -> Result<u64, Interrupt> {
         let step = &self.plan.steps[depth];
-        let fits = match candidate {
-            Candidate::Node(id, exact) => self.bind(step, 0, (id, exact), slots),
-            Candidate::Edge(key, [from, to]) => {
-                key.from != key.to
-                    && self.bind(step, 0, (key.from, from), slots)
-                    && self.bind(step, 1, (key.to, to), slots)
-            }
+        let read = match (step.source, other) {
+            (Source::Out { link }, _) => self.follow(Way::Out, link, depth, from, slots)?,
+            (Source::In { link }, _) => self.follow(Way::In, link, depth, from, slots)?,
+            (_, Some(other)) => self.take(other, depth, slots)?,
+            (_, None) => 0,
         };
-        Ok(fits && self.passes(&step.links, &step.tests, slots)?)
+        slots.environment.spend(read)?;
+        Ok(read)
     }
 
-    /// Puts a node into one of a step's slots, unless its type is wrong or another slot has it.
-    fn bind(
+    fn follow(
         &self,
-        step: &Step,
-        index: usize,
-        (id, exact): (NodeId, TypeId),
-        slots: &mut Slots<'_, 'h, H>,
-    ) -> bool {
-        let Some(slot) = step.binds[index] else {
-            return true;
+        way: Way,
+        link: usize,
+        depth: usize,
+        from: NodeId,
+        slots: &mut Slots<'_>,
+    ) -> Result<u64, ReadError> {
+        let Link {
+            from: source,
+            label,
+            to: target,
+            ..
+        } = self.query.links[link];
+        let (origin, slot) = match way {
+            Way::Out => (source, target),
+            Way::In => (target, source),
         };
-        let taken = Slot::Node(id);
-        let mut others = step.others[index].iter();
-        let free = self.query.domains[slot].contains(exact)
-            && !others.any(|&other| slots.environment[other] == taken);
-        if free {
-            slots.put(slot, id);
-        }
-        free
+        let (Some(origin), Some(label)) = (node(slots.environment, origin), label) else {
+            return Ok(0);
+        };
+        let (domain, others) = (&self.query.domains[slot], &self.plan.steps[depth].others[0]);
+        let (ahead, environment) = (&mut slots.ahead[depth], &*slots.environment);
+        let mut visited = 0;
+        let more = self.host.visit_ends(way, origin, label, from, |id, exact| {
+            visited += 1;
+            if domain.contains(exact) && !is_in(others, id, environment) {
+                ahead.push([id; 2]);
+            }
+        });
+        ahead.stopped_at(more?);
+        Ok(visited)
     }
+
+    #[inline(never)]
+    fn take(
+        &self,
+        other: &mut Candidates<'h, H>,
+        depth: usize,
+        slots: &mut Slots<'_>,
+    ) -> Result<u64, ReadError> {
+        let step = &self.plan.steps[depth];
+        let (ahead, environment) = (&mut slots.ahead[depth], &*slots.environment);
+        let fits = |index: usize, (id, exact): (NodeId, TypeId)| {
+            step.binds[index].is_none_or(|slot| {
+                self.query.domains[slot].contains(exact)
+                    && !is_in(&step.others[index], id, environment)
+            })
+        };
+        let mut read = 0;
+        for candidate in other.take(TOGETHER) {
+            read += 1;
+            match candidate? {
+                Candidate::Node(id, exact) if fits(0, (id, exact)) => ahead.push([id; 2]),
+                Candidate::Edge(EdgeKey { from, to, .. }, [source, target])
+                    if from != to && fits(0, (from, source)) && fits(1, (to, target)) =>
+                {
+                    ahead.push([from, to]);
+                }
+                _ => {}
+            }
+        }
+        ahead.stopped_at((read == TOGETHER as u64).then_some(NodeId(0)));
+        Ok(read)
+    }
+}
+
+/// Whether one of the slots has the node.
+#[inline]
+fn is_in(slots: &[usize], id: NodeId, environment: &Environment) -> bool {
+    slots
+        .iter()
+        .any(|&slot| environment[slot] == Slot::Node(id))
 }
 
 /// The matches of a rule or goal, found one at a time.

@@ -2,7 +2,7 @@
 //!
 //! Guarantee: both ends of every edge have it, in ascending order.
 
-use crate::matching::Host;
+use crate::matching::{Host, Way};
 use dsr::{
     AttributeId, EdgeKey, LabelId, NodeId, NodeIds, ReadError, Snapshot, TripleCount, TypeId,
     Value, ValueRange, Version,
@@ -12,6 +12,8 @@ use std::collections::BTreeSet;
 
 /// Ids below this many times the number of nodes, and a few, are looked up by place.
 const DENSE: u64 = 4;
+/// So many ends of edges are visited together: where the first match is enough, not all are wanted.
+const TOGETHER: usize = 4;
 
 /// Nodes and links of a snapshot, to be rewritten in place: without versions, names or a schema's
 /// ranges. Attributes are those of the snapshot, for as long as it can be read.
@@ -128,6 +130,13 @@ impl WorkingGraph {
         }
     }
 
+    fn ends(&self, way: Way, of: NodeId) -> &[(LabelId, NodeId)] {
+        self.entry(of).map_or(&[], |entry| match way {
+            Way::Out => &entry.out,
+            Way::In => &entry.into,
+        })
+    }
+
     /// All nodes with their types, type by type.
     pub fn nodes(&self) -> impl Iterator<Item = (NodeId, TypeId)> {
         let types = (0..).map(TypeId).zip(&self.members);
@@ -137,7 +146,7 @@ impl WorkingGraph {
     /// All edges, by the types of their sources.
     pub fn edges(&self) -> impl Iterator<Item = EdgeKey> {
         self.nodes().flat_map(|(from, _)| {
-            let out = self.entry(from).map_or(&[][..], |entry| &entry.out);
+            let out = self.ends(Way::Out, from);
             out.iter()
                 .map(move |&(label, to)| EdgeKey { from, label, to })
         })
@@ -253,14 +262,15 @@ impl Host for WorkingGraph {
             .map_or(TypeId(u16::MAX), |entry| entry.exact)
     }
 
-    fn has_target(&self, from: NodeId, label: LabelId, to: NodeId) -> Result<bool, ReadError> {
-        let from = self.entry(from);
-        Ok(from.is_some_and(|from| from.out.binary_search(&(label, to)).is_ok()))
-    }
-
-    fn has_source(&self, to: NodeId, label: LabelId, from: NodeId) -> Result<bool, ReadError> {
-        let to = self.entry(to);
-        Ok(to.is_some_and(|to| to.into.binary_search(&(label, from)).is_ok()))
+    fn has_end(
+        &self,
+        way: Way,
+        of: NodeId,
+        label: LabelId,
+        other: NodeId,
+    ) -> Result<bool, ReadError> {
+        let ends = self.ends(way, of);
+        Ok(ends.binary_search(&(label, other)).is_ok())
     }
 
     fn node_value(&self, node: NodeId, attribute: AttributeId) -> Result<Option<Value>, ReadError> {
@@ -278,19 +288,35 @@ impl Host for WorkingGraph {
     }
 
     fn targets(&self, from: NodeId, label: LabelId) -> Ends<'_> {
-        let ends = self.entry(from).map_or(&[][..], |from| &from.out);
         Ends {
             graph: self,
-            ends: labelled(ends, label).iter(),
+            ends: labelled(self.ends(Way::Out, from), label).iter(),
         }
     }
 
     fn sources(&self, to: NodeId, label: LabelId) -> Ends<'_> {
-        let ends = self.entry(to).map_or(&[][..], |to| &to.into);
         Ends {
             graph: self,
-            ends: labelled(ends, label).iter(),
+            ends: labelled(self.ends(Way::In, to), label).iter(),
         }
+    }
+
+    fn visit_ends(
+        &self,
+        way: Way,
+        of: NodeId,
+        label: LabelId,
+        from: NodeId,
+        mut visit: impl FnMut(NodeId, TypeId),
+    ) -> Result<Option<NodeId>, ReadError> {
+        let ends = self.ends(way, of);
+        let first = ends.partition_point(|end| *end < (label, from));
+        let mut ends = ends[first..].iter();
+        let mut ends = ends.by_ref().take_while(|(other, _)| *other == label);
+        for &(_, node) in ends.by_ref().take(TOGETHER) {
+            visit(node, self.type_of(node));
+        }
+        Ok(ends.next().map(|&(_, node)| node))
     }
 
     fn members(&self, exact: TypeId) -> Ids<'_> {

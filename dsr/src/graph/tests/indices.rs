@@ -1,8 +1,8 @@
 //! The indices of a snapshot against what a walk over its nodes and edges counts.
 
 use crate::{
-    AttributeId, AttributeType, EdgeKey, LabelId, NodeId, ReadError, Schema, Snapshot, TypeId,
-    ValueRange,
+    AttributeId, AttributeType, EdgeKey, Graph, LabelId, NodeId, ReadError, Schema, Snapshot, Time,
+    Transaction, TypeId, ValueRange,
 };
 use std::collections::BTreeMap;
 
@@ -58,15 +58,64 @@ fn types_at_ends(snapshot: &Snapshot, label: LabelId) -> Result<(), ReadError> {
         let (key, types) = edge?;
         let (from, to) = (find(key.from)?, find(key.to)?);
         assert_eq!(types, [from.type_id(), to.type_id()]);
-        assert!(from.has_target(label, key.to)? && to.has_source(label, key.from)?);
+        assert!(snapshot.has_edge(key)? && snapshot.has_edge_into(key)?);
         let targets = from
             .typed_targets_of(label)
             .collect::<Result<Vec<_>, _>>()?;
         assert!(targets.contains(&(key.to, to.type_id())));
         let sources = to.typed_sources_of(label).collect::<Result<Vec<_>, _>>()?;
         assert!(sources.contains(&(key.from, from.type_id())));
+        let pieces = in_pieces(|from, visit| snapshot.visit_targets(key.from, label, from, visit))?;
+        assert_eq!(pieces.concat(), targets);
+        let pieces = in_pieces(|from, visit| snapshot.visit_sources(key.to, label, from, visit))?;
+        assert_eq!(pieces.concat(), sources);
     }
     Ok(())
+}
+
+type Visit<'v> = &'v mut dyn FnMut(NodeId, TypeId);
+
+/// All that is visited, by visit.
+fn in_pieces(
+    visit: impl Fn(NodeId, Visit<'_>) -> Result<Option<NodeId>, ReadError>,
+) -> Result<Vec<Vec<(NodeId, TypeId)>>, ReadError> {
+    let (mut all, mut next) = (Vec::new(), Some(NodeId(0)));
+    while let Some(from) = next {
+        let mut piece = Vec::new();
+        next = visit(from, &mut |id, exact| piece.push((id, exact)))?;
+        all.push(piece);
+    }
+    Ok(all)
+}
+
+#[test]
+fn the_edges_of_a_hub_are_visited_in_pieces() {
+    let mut graph = Graph::in_memory(Schema::open());
+    let mut world = Transaction::new();
+    world.create_node("hub", "hub", vec![]);
+    for index in 0..500 {
+        let name = format!("n{index}");
+        world.create_node("leaf", &name, vec![]);
+        for label in ["before", "on", "then"] {
+            if label == "on" || index % 7 == 0 {
+                world.create_edge("hub", label, name.as_str());
+            }
+        }
+    }
+    graph.commit(&world, "test", Time::default()).unwrap();
+    let snapshot = graph.snapshot();
+    let hub = snapshot.find_node_by_name("hub").unwrap().unwrap().id();
+    for (label, count) in [("before", 72), ("on", 500), ("then", 72)] {
+        let label = snapshot.schema().find_label(label).unwrap();
+        types_at_ends(&snapshot, label).unwrap();
+        let pieces = in_pieces(|from, visit| snapshot.visit_targets(hub, label, from, visit));
+        let pieces = pieces.unwrap();
+        assert_eq!(pieces.concat().len(), count);
+        assert!(pieces.iter().all(|piece| piece.len() <= 32), "{pieces:?}");
+    }
+    let on = snapshot.schema().find_label("on").unwrap();
+    let nobody = in_pieces(|from, visit| snapshot.visit_targets(NodeId(9999), on, from, visit));
+    assert_eq!(nobody.unwrap(), [[]]);
 }
 
 /// The same, counted.

@@ -473,7 +473,8 @@ impl Pattern {
         };
         frame.first(&mut Slots {
             environment: &mut problem.environment,
-            nodes: &mut vec![None; problem.query.variables.len()],
+            // All slots are given: there is no step.
+            ahead: &mut [],
         })
     }
 }
