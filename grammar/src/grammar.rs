@@ -3,7 +3,7 @@
 //! Guarantee: `rules` has the rules of every file that was read, in reading order, also where
 //! other rules were broken.
 
-use crate::{Condition, Name, Pattern, Rule, SourceFile, Unfolded};
+use crate::{Condition, Name, Pattern, Region, Rule, SourceFile, Unfolded};
 use dsr::{NodeType, Schema};
 use std::collections::BTreeMap;
 
@@ -26,6 +26,8 @@ pub struct Grammar {
     pub comments: Vec<String>,
     /// The files read; 0 is the main one. Spans index into it.
     pub files: Vec<SourceFile>,
+    /// The parts of the files; see [`Grammar::sound`].
+    pub regions: Vec<Region>,
 }
 
 impl Grammar {

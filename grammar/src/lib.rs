@@ -81,6 +81,7 @@ mod parser;
 mod print;
 mod rewriter;
 mod rule;
+mod sound;
 mod source;
 #[cfg(test)]
 mod testing;
@@ -107,5 +108,6 @@ pub use rule::{
     Arithmetic, AttributePath, Comparison, Condition, Effect, Expression, Kind, Literal, Pattern,
     PatternEdge, PatternNode, Rule,
 };
+pub use sound::{Part, Region, Sound};
 pub use source::{Name, SourceFile, Span};
 pub use unfold::{OPTIONAL_LIMIT, Unfolded, UnfoldedStep};

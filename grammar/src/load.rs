@@ -186,6 +186,7 @@ impl Reading<'_, '_> {
             items,
             comments,
             broken,
+            regions,
             findings,
         } = parsed;
         if index == 0 {
@@ -194,6 +195,7 @@ impl Reading<'_, '_> {
         }
         self.grammar.types.declarations.extend(types.declarations);
         self.broken.extend(broken);
+        self.grammar.regions.extend(regions);
         self.findings.extend(findings);
         for item in items {
             match item {

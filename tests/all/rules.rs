@@ -221,6 +221,40 @@ fn a_combo_is_listed_with_the_rules_that_it_stands_for() {
 }
 
 #[test]
+fn rules_beside_a_broken_one_are_used_and_the_broken_one_is_told() {
+    let broken = "bad : active(1)\n{\n\t{ r:robto }\n\t=>\n\t{ r:robto }\n}\n";
+    let text = format!("{RULES}{broken}");
+    let folder = Folder::new(&[("a.aggl", text.as_str()), ("world", WORLD)]);
+    let one = ["--world", "--rule", "changeRoom"];
+    let apply = ["--world", "--rule", "changeRoom", "--bind", "b=r2"];
+    for (verb, rest) in [
+        ("match", &one[..]),
+        ("match", &one[..1]),
+        ("explain", &one[..]),
+        ("export", &["--dot"][..]),
+        ("apply", &apply[..]),
+    ] {
+        let (code, out, err) = rules(&folder, verb, "a.aggl", rest);
+        assert_eq!(code, 0, "{verb}: {err}");
+        assert!(out.contains("changeRoom") && !out.contains("bad"), "{out}");
+        assert!(err.contains("a.aggl:24:6: error: "), "{err}");
+        assert!(
+            err.contains("warning: without the broken rules `bad`\n"),
+            "{err}"
+        );
+    }
+    let (code, _, err) = rules(&folder, "match", "a.aggl", &["--world", "--rule", "bad"]);
+    assert_eq!(code, 2);
+    assert!(err.contains("robto"), "{err}");
+    fs::write(
+        folder.path("a.aggl"),
+        text.replace("(room : thing)", "(room thing"),
+    )
+    .unwrap();
+    assert_eq!(rules(&folder, "match", "a.aggl", &one).0, 2);
+}
+
+#[test]
 fn a_file_that_is_not_there_is_bad_input() {
     let folder = Folder::new(&[]);
     for verb in ["check", "list", "fmt"] {

@@ -3,6 +3,7 @@
 //! Guarantee: what is shown is the plan that a search for the same rule in the same snapshot goes
 //! by.
 
+use super::environment::Interrupt;
 use super::plan::{Plan, Source, plan};
 use super::query::{Problem, Query};
 use super::search::Search;
@@ -26,6 +27,9 @@ pub struct SearchPlan {
     /// Whether the counts are the graph's own, not what is taken for granted where there is none:
     /// a hundred nodes of a type, two links of a label at each.
     pub counted: bool,
+    /// How many nodes had been tried for one match when the search was given up: what its steps found
+    /// is what they found until then.
+    pub given_up: Option<u64>,
 }
 
 /// One step of a search: candidates for one variable, or for both ends of a link.
@@ -73,7 +77,7 @@ impl Grammar {
         };
         let plan = Arc::new(plan(&query, &statistics, &problem.given()));
         let seen = snapshot.map(|snapshot| run(snapshot, problem, &plan));
-        let seen = seen.transpose()?;
+        let (seen, given_up) = seen.transpose()?.unzip();
         let words = Words {
             rule,
             query: &query,
@@ -98,6 +102,7 @@ impl Grammar {
             steps: steps.collect(),
             cost: plan.cost,
             counted: snapshot.is_some(),
+            given_up: given_up.flatten(),
         })
     }
 
@@ -169,15 +174,21 @@ fn condition_names(condition: &Condition, add: &mut Add<'_>) {
     }
 }
 
-/// A whole search; by step, how many candidates there were and how many passed.
-fn run(
-    snapshot: &Snapshot,
-    problem: Problem,
-    plan: &Arc<Plan>,
-) -> Result<Vec<[u64; 2]>, MatchError> {
+/// A whole search, or as far as it gets: by step, how many candidates there were and how many passed;
+/// and the limit that ended it.
+type Seen = (Vec<[u64; 2]>, Option<u64>);
+
+fn run(snapshot: &Snapshot, problem: Problem, plan: &Arc<Plan>) -> Result<Seen, MatchError> {
     let mut search = Search::new(snapshot, problem, Arc::clone(plan));
-    while search.advance()? {}
-    Ok(search.seen().to_vec())
+    let given_up = loop {
+        match search.advance() {
+            Ok(true) => {}
+            Ok(false) => break None,
+            Err(Interrupt::Limit(limit)) => break Some(limit),
+            Err(error) => return Err(error.into()),
+        }
+    };
+    Ok((search.seen().to_vec(), given_up))
 }
 
 struct Words<'a> {
@@ -215,5 +226,35 @@ impl Words<'_> {
             .map(|&link| self.rule.left.edges[link].to_string());
         let tests = tests.iter().map(|&test| conditions[test].to_string());
         links.chain(tests).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parse_grammar;
+    use dsr::{Graph, Time, Transaction};
+
+    #[test]
+    fn a_search_that_is_given_up_tells_how_far_it_came() {
+        let mut graph = Graph::in_memory(Schema::open());
+        let mut world = Transaction::new();
+        for index in 0..100 {
+            world.create_node("box", &format!("b{index}"), vec![]);
+        }
+        graph.commit(&world, "world", Time::default()).unwrap();
+        let snapshot = graph.snapshot();
+        let text =
+            "name=g\n===\nr : passive(1) { { a:box b:box } => { } precondition { (= a b) } }";
+        let (grammar, _) = parse_grammar(text, "g.aggl");
+        let query = grammar.rule_query(snapshot.schema(), &grammar.rules[0]);
+        let mut problem = Arc::new(query.unwrap()).at("r", &Binding::new()).unwrap();
+        let query = Arc::clone(&problem.query);
+        let order = plan(&query, &Statistics::assumed(&query), &[]);
+        problem.environment.set_limit(1000);
+        let (seen, given_up) = run(&snapshot, problem, &Arc::new(order)).unwrap();
+        assert_eq!(given_up, Some(1000));
+        let tried: u64 = seen.iter().map(|[candidates, _]| candidates).sum();
+        assert!((900..=1000).contains(&tried), "{seen:?}");
     }
 }

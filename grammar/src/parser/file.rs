@@ -5,6 +5,7 @@
 use super::rule::{Action, Broken};
 use super::{Finding, NodeNames, Parser};
 use crate::lexer::TokenKind;
+use crate::sound::{Part, Region};
 use crate::{Combo, Include, Name, Problem, Property, Rule, Span, TypeDeclaration, Types};
 
 /// A grammar file by itself, its includes not followed.
@@ -16,6 +17,8 @@ pub(crate) struct ParsedFile {
     pub(crate) comments: Vec<String>,
     /// Rules and combos with errors in them.
     pub(crate) broken: Vec<Broken>,
+    /// Where each of its parts begins.
+    pub(crate) regions: Vec<Region>,
     pub(crate) findings: Vec<Finding>,
 }
 
@@ -113,6 +116,9 @@ impl Parser<'_> {
                 break;
             };
             if self.is_word("include") && self.is_symbol_at(self.at + 1, "(") {
+                parsed
+                    .regions
+                    .push(self.region(token.range.start, Part::Other));
                 let comments = self.comments_before(token.range.start);
                 if let Some(path) = self.include() {
                     parsed.items.push(Item::Include(Include { path, comments }));
@@ -120,6 +126,9 @@ impl Parser<'_> {
                     self.skip_to_item();
                 }
             } else if self.is_word("types") && self.is_symbol_at(self.at + 1, "{") {
+                parsed
+                    .regions
+                    .push(self.region(token.range.start, Part::Other));
                 if !parsed.types.is_empty() {
                     let what = "`types`".to_owned();
                     self.report(token.range, Problem::Repeated { what });
@@ -131,6 +140,14 @@ impl Parser<'_> {
                 let action = self.action();
                 let end = self.tokens[self.at.saturating_sub(1)].range.end;
                 let comments = self.comments_before(end);
+                let name = match &action {
+                    Ok(Action::Rule(rule)) => Some(rule.name.clone()),
+                    Ok(Action::Combo(combo)) => Some(combo.name.clone()),
+                    Err(broken) => broken.name.clone(),
+                };
+                parsed
+                    .regions
+                    .push(self.region(token.range.start, Part::Rule(name)));
                 match action {
                     Ok(Action::Rule(mut rule)) => {
                         rule.comments = comments;
@@ -150,6 +167,11 @@ impl Parser<'_> {
                 self.skip_to_item();
             }
         }
+    }
+
+    fn region(&self, start: usize, of: Part) -> Region {
+        let start = self.span(start..start);
+        Region { start, of }
     }
 
     /// Takes the comments that begin before byte `end`.

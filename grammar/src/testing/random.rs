@@ -350,6 +350,7 @@ impl Words {
                     includes,
                     comments,
                     files: Vec::new(),
+                    regions: Vec::new(),
                 },
             )
     }

@@ -78,7 +78,7 @@ pub(super) fn apply(
     bind: &[(String, String)],
     as_json: bool,
 ) -> Result<Answer, Failure> {
-    let grammar = load(file)?;
+    let grammar = load(file, Some(name))?;
     let rule = find_rule(&grammar, name)?;
     let mut world = World::open(world)?;
     let snapshot = world.snapshot()?;

@@ -15,7 +15,7 @@ pub(super) fn explain(
     world: Option<&Path>,
     as_json: bool,
 ) -> Result<Answer, Failure> {
-    let grammar = load(file)?;
+    let grammar = load(file, rule)?;
     let rules: Vec<&Rule> = match rule {
         Some(name) => vec![find_rule(&grammar, name)?],
         None => grammar.rules.iter().collect(),
@@ -55,6 +55,7 @@ fn plan_json(plan: &SearchPlan) -> Json {
         "rule": plan.rule,
         "cost": plan.cost,
         "counted": plan.counted,
+        "given_up": plan.given_up,
         "checks": plan.checks,
         "steps": plan.steps.iter().map(step).collect::<Vec<_>>(),
     })
@@ -115,6 +116,11 @@ fn table(plan: &SearchPlan) -> String {
             .collect();
         // Writing to a string does not fail.
         let _ = writeln!(text, "    {}", cells.join("  ").trim_end());
+    }
+    if let Some(limit) = plan.given_up {
+        let tried = "nodes had been tried for one match; found is what was found until then";
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "    given up after {limit} {tried}");
     }
     text
 }

@@ -13,7 +13,7 @@ use crate::{Answer, Failure};
 use dsr::{Graph, NodeId, Session, Snapshot};
 use grammar::{
     Binding, Combo, ComboStep, Defects, Diagnostic, Grammar, MatchError, Problem, Rule, Severity,
-    Unfolded,
+    Sound, Unfolded,
 };
 use serde_json::{Map, Value as Json, json};
 use std::collections::{BTreeMap, BTreeSet};
@@ -65,8 +65,31 @@ fn read(file: &Path) -> Result<(Grammar, Vec<Diagnostic>), Failure> {
     Ok(super::read_grammar(&super::read_text(file)?, file))
 }
 
-fn load(file: &Path) -> Result<Grammar, Failure> {
-    super::load_grammar(&super::read_text(file)?, file)
+/// The grammar, without the rules in which errors lie: those are told, and do not keep others from
+/// being used. If that one rule is asked for, or nothing is left, they are the failure.
+fn load(file: &Path, rule: Option<&str>) -> Result<Grammar, Failure> {
+    let (grammar, mut diagnostics) = read(file)?;
+    if !grammar::has_errors(&diagnostics) {
+        return Ok(grammar);
+    }
+    let sound = grammar
+        .sound(&diagnostics)
+        .filter(|Sound { grammar, left_out }| {
+            let asked = rule.is_some_and(|rule| left_out.iter().any(|name| *name == *rule));
+            let there = rule.is_some_and(|rule| grammar.rule(rule).is_some());
+            grammar.all_rules().next().is_some() && (there || !asked)
+        });
+    let Some(Sound { grammar, left_out }) = sound else {
+        return Err(Failure::Input(Defects { diagnostics }.into()));
+    };
+    diagnostics.retain(|diagnostic| diagnostic.severity() == Severity::Error);
+    warn(diagnostics);
+    let names: Vec<String> = left_out.iter().map(|name| format!("`{name}`")).collect();
+    tell(&format!(
+        "warning: without the broken rules {}\n",
+        names.join(", ")
+    ));
+    Ok(grammar)
 }
 
 fn diagnostics_json(diagnostics: &[Diagnostic]) -> Vec<Json> {
@@ -289,7 +312,7 @@ impl World {
 }
 
 fn export(file: &Path, rule: Option<&str>, as_json: bool) -> Result<Answer, Failure> {
-    let grammar = load(file)?;
+    let grammar = load(file, rule)?;
     let rules: Vec<&Rule> = match rule {
         Some(name) => vec![find_rule(&grammar, name)?],
         None => grammar.all_rules().collect(),
@@ -395,7 +418,7 @@ fn matches(
     only_count: bool,
     as_json: bool,
 ) -> Result<Answer, Failure> {
-    let grammar = load(file)?;
+    let grammar = load(file, rule)?;
     let rules: Vec<&Rule> = match rule {
         Some(name) => vec![find_rule(&grammar, name)?],
         None => grammar.all_rules().collect(),
