@@ -2,16 +2,17 @@
 //! objects; and the grid of costs. This file owns what is drawn over what; the text of a picture is a
 //! function of the situation, to the byte.
 
+mod cells;
 mod key;
 mod passing;
 
-use super::canvas::{self, INK, PEOPLE, View, heat, number, rectangle, text};
+use super::canvas::{self, INK, PEOPLE, View, heat, number, text};
 use super::label::{Labels, Look};
 use super::legend;
 use crate::situation::Situation;
-use agents::grid::CostGrid;
 use agents::social_mapping::object_space::Outline;
 use agents::social_mapping::{Layer, SocialConfig, Update, Zone};
+use cells::is_crowd;
 use nalgebra::{Point2, Vector2};
 use svg::Document;
 use svg::node::element::{Group, Rectangle};
@@ -107,18 +108,26 @@ fn map(
         group = group.add(view.polygon(room.iter().copied()).set("fill", "#ffffff"));
     }
     group = match show {
-        Show::Costs(_) => group.add(costs(view, &update.grid)),
+        Show::Costs(_) => group.add(cells::costs(view, &update.grid)),
         Show::Density => group
             .add(spaces(view, update, config))
-            .add(bands(view, update)),
+            .add(if is_crowd(update) {
+                cells::density(view, update)
+            } else {
+                bands(view, update)
+            }),
     };
-    group = group
-        .add(contours(view, update, config))
-        .add(passing::passing(view, update, &config.proxemics.levels))
-        .add(groups(view, update, config))
-        .add(walls(view, situation))
-        .add(people(view, update, situation, &mut labels));
-    label_groups(view, update, &mut labels);
+    if !is_crowd(update) {
+        group = group
+            .add(contours(view, update, config))
+            .add(passing::passing(view, update, &config.proxemics.levels))
+            .add(groups(view, update, config));
+    }
+    group = group.add(walls(view, situation));
+    if !is_crowd(update) {
+        group = group.add(people(view, update, situation, &mut labels));
+        label_groups(view, update, &mut labels);
+    }
     for one in &update.objects {
         let look = Look {
             size: 11.0,
@@ -130,30 +139,6 @@ fn map(
         labels.centred(view.page(centre), &words, look);
     }
     group.add(labels.draw())
-}
-
-/// Grid cells of one cost, each row's neighbours in one piece.
-fn costs(view: &View, grid: &CostGrid) -> Group {
-    let mut group = Group::new().set("shape-rendering", "crispEdges");
-    for row in 0..grid.height {
-        let costs = &grid.costs[row * grid.width..(row + 1) * grid.width];
-        let mut column = 0;
-        for run in costs.chunk_by(|a, b| a.to_bits() == b.to_bits()) {
-            let start = column;
-            column += run.len();
-            let Some(colour) = cost_colour(run[0]) else {
-                continue;
-            };
-            let corner = |column: usize, row: usize| {
-                let step = Vector2::new(column as f64, row as f64) * grid.resolution;
-                view.page(grid.origin + step)
-            };
-            let (low, high) = (corner(start, row), corner(column, row + 1));
-            let piece = rectangle(low.x, high.y, high.x - low.x, low.y - high.y);
-            group = group.add(piece.set("fill", colour));
-        }
-    }
-    group
 }
 
 /// The dearest cost that is not blocked (personal space).

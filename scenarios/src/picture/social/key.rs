@@ -2,7 +2,7 @@
 //! that is not drawn.
 
 use super::super::canvas::{FAINT, INK, PEOPLE, heat, line, number, rectangle, text};
-use super::{GROUP, Show, cost_colour, density_colour, passing};
+use super::{GROUP, Show, cost_colour, density_colour, is_crowd, passing};
 use crate::situation::Situation;
 use agents::social_mapping::{SocialConfig, Update};
 use svg::node::element::Group;
@@ -78,14 +78,20 @@ pub(super) fn column(
         }
     }
     y += 6.0;
-    column = column.add(heading(y, "Edges of zones"));
-    y += LINE;
+    let crowd = is_crowd(update);
+    if !crowd {
+        column = column.add(heading(y, "Edges of zones"));
+        y += LINE;
+    }
     let levels = &config.proxemics.levels;
     for (name, level, width, dashes) in [
         ("intimate", levels.intimate, "1.8", "none"),
         ("personal", levels.personal, "1.1", "none"),
         ("social", levels.social, "0.8", "4 3"),
-    ] {
+    ]
+    .into_iter()
+    .filter(|_| !crowd)
+    {
         let stroke = line(left, y - 4.0, left + 28.0, y - 4.0)
             .set("stroke", "#0b2f5b")
             .set("stroke-width", width)
@@ -94,7 +100,7 @@ pub(super) fn column(
         column = column.add(stroke).add(words(40.0, y, &name, INK));
         y += LINE;
     }
-    if passing::is_wanted(update) {
+    if !crowd && passing::is_wanted(update) {
         let zone = rectangle(left, y - 10.0, 28.0, 12.0)
             .set("fill", passing::WANTED)
             .set("fill-opacity", "0.45");
@@ -103,7 +109,7 @@ pub(super) fn column(
             .add(words(40.0, y, "cooperation zone", INK));
         y += LINE;
     }
-    if passing::is_shut(update) {
+    if !crowd && passing::is_shut(update) {
         let bar = line(left, y - 4.0, left + 28.0, y - 4.0)
             .set("stroke", passing::SHUT)
             .set("stroke-width", "4");
@@ -117,22 +123,27 @@ pub(super) fn column(
         &format!("People: {count}, groups: {}", update.groups.len()),
     ));
     y += LINE;
-    let body = svg::node::element::Circle::new()
-        .set("cx", number(left + 14.0))
-        .set("cy", number(y - 4.0))
-        .set("r", 6)
-        .set("fill", PEOPLE)
-        .set("stroke", INK);
-    column = column
-        .add(body)
-        .add(words(40.0, y, "person, facing", INK))
-        .add(
-            line(left + 14.0, y - 4.0, left + 28.0, y - 4.0)
-                .set("stroke", INK)
-                .set("stroke-width", "2"),
-        );
-    y += LINE;
-    if !update.groups.is_empty() {
+    if crowd {
+        column = column.add(words(0.0, y, "too many to draw each", FAINT));
+        y += LINE;
+    } else {
+        let body = svg::node::element::Circle::new()
+            .set("cx", number(left + 14.0))
+            .set("cy", number(y - 4.0))
+            .set("r", 6)
+            .set("fill", PEOPLE)
+            .set("stroke", INK);
+        column = column
+            .add(body)
+            .add(words(40.0, y, "person, facing", INK))
+            .add(
+                line(left + 14.0, y - 4.0, left + 28.0, y - 4.0)
+                    .set("stroke", INK)
+                    .set("stroke-width", "2"),
+            );
+        y += LINE;
+    }
+    if !crowd && !update.groups.is_empty() {
         let spoke = line(left, y - 4.0, left + 28.0, y - 4.0)
             .set("stroke", GROUP)
             .set("stroke-width", "2.2");
