@@ -221,7 +221,11 @@ impl Replanner {
                 continue;
             }
             let first = self.nodes[start];
-            if place >= self.key(start, estimate) && first.follows <= first.settled {
+            // Along a cheapest path all totals are the same but for rounding.
+            let (total, _) = self.key(start, estimate);
+            let total = f64::from_bits(total);
+            let beyond = f64::from_bits(place.0) > total + SAME * total;
+            if beyond && first.follows <= first.settled {
                 break;
             }
             self.open.pop();

@@ -91,6 +91,38 @@ fn a_change_beside_the_robot_costs_a_small_part_of_a_search_from_scratch() {
 }
 
 #[test]
+fn on_a_long_way_of_many_costs_rounding_makes_no_search_begin_anew() {
+    let side = 500usize;
+    let mut grid = CostGrid::covering([0.0, 0.0, 500.0, 500.0], 1.0);
+    // Spaces of people and objects, and what is left of walls between them.
+    for k in 0..side * side {
+        let (x, y) = (k % side, k / side);
+        let (across, along) = (x % 41, y % 37);
+        let away = across.abs_diff(20).pow(2) + along.abs_diff(18).pow(2);
+        grid.costs[k] = match away {
+            0..16 => BLOCKED,
+            16..64 => 4.0,
+            64..100 => 2.0,
+            100..144 => 1.5,
+            _ if across == 0 && along > 9 => BLOCKED,
+            _ => 1.0,
+        };
+    }
+    let mut planner = Replanner::new(&grid, (480, 490), CostModel::LengthMean).unwrap();
+    let mut path = planner.find(&grid, (6, 5)).unwrap();
+    let first = planner.expanded();
+    for turn in 0..20 {
+        let before = planner.expanded();
+        let (robot, at) = (path.cells[4], path.cells[20 + turn]);
+        grid.costs[at.1 * side + at.0] = BLOCKED;
+        planner.update(&grid, [at]);
+        path = planner.find(&grid, robot).unwrap();
+        let again = planner.expanded() - before;
+        assert!(again * 5 < first, "turn {turn}: {again} of {first} nodes");
+    }
+}
+
+#[test]
 fn a_goal_that_is_closed_later_is_told_and_opens_again() {
     let mut grid = CostGrid::covering([0.0, 0.0, 5.0, 1.0], 1.0);
     let mut planner = Replanner::new(&grid, (4, 0), CostModel::LengthMean).unwrap();
