@@ -17,6 +17,7 @@ pub mod scenario;
 pub mod scenes;
 pub mod situation;
 pub mod tracks;
+pub mod trial;
 pub mod world;
 
 pub use initial_graph::{WORLD, activity_attributes, initial_graph, schema};

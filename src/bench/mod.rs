@@ -28,6 +28,7 @@ mod rules;
 mod social;
 mod whole;
 
+pub(crate) use chance::Chance;
 pub(crate) use figure::{Figure, table};
 pub(crate) use path::paths;
 pub(crate) use peer::play;

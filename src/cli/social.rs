@@ -102,6 +102,9 @@ pub(crate) struct SocialPicture {
 pub(crate) struct Experiment {
     /// `list`, or the name of an experiment
     pub(crate) name: String,
+    /// How often to repeat what chance plays a part in
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub(crate) seeds: u64,
     /// For machines
     #[arg(long)]
     pub(crate) json: bool,

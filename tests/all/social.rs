@@ -368,7 +368,15 @@ fn every_experiment_listed_runs() {
         .iter()
         .map(|one| one["name"].as_str().unwrap())
         .collect();
-    for name in ["fd-table1", "fd-table5", "tg-shapes", "tg-groups"] {
+    for name in [
+        "td-table1",
+        "td-table2",
+        "td-gains",
+        "fd-table1",
+        "fd-table5",
+        "tg-shapes",
+        "tg-groups",
+    ] {
         assert!(names.contains(&name), "{name}");
     }
     let (code, out, _) = cortex(&["experiment", "fd-table1", "--json"]);

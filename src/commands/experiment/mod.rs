@@ -1,6 +1,7 @@
 //! `cortex experiment`: the papers' tables and figures, ours beside what is printed. This module owns
 //! the list of those there are, and guarantees that every one listed runs.
 
+mod drives;
 mod flexible_density;
 mod social_groups;
 mod social_shapes;
@@ -18,45 +19,61 @@ struct Experiment {
     name: &'static str,
     /// What it shows, in a line.
     about: &'static str,
-    run: fn() -> Result<Table, Failure>,
+    /// Does it with so many seeds, where chance plays a part.
+    run: fn(u64) -> Result<Table, Failure>,
 }
 
 /// Every experiment, in the order of the papers.
 const EXPERIMENTS: &[Experiment] = &[
     Experiment {
+        name: "td-table1",
+        about: "a way past a table and a television, in use or not (TD Table 1)",
+        run: drives::table1,
+    },
+    Experiment {
+        name: "td-table2",
+        about: "the agenda changes while the robot is on its way (TD Table 2)",
+        run: drives::table2,
+    },
+    Experiment {
+        name: "td-gains",
+        about: "the search for the gains of the elastic band (TD 5.4)",
+        run: drives::gains,
+    },
+    Experiment {
         name: "fd-table1",
         about: "personal space and passage with a wall ahead of a person (FD Table I)",
-        run: flexible_density::table1,
+        run: |_| flexible_density::table1(),
     },
     Experiment {
         name: "fd-table2",
         about: "the same with a wall to the side (FD Table II)",
-        run: flexible_density::table2,
+        run: |_| flexible_density::table2(),
     },
     Experiment {
         name: "fd-table3",
         about: "the same with a wall behind (FD Table III)",
-        run: flexible_density::table3,
+        run: |_| flexible_density::table3(),
     },
     Experiment {
         name: "fd-table4",
         about: "three people in a corridor (FD Table IV)",
-        run: flexible_density::table4,
+        run: |_| flexible_density::table4(),
     },
     Experiment {
         name: "fd-table5",
         about: "three people in an apartment (FD Table V)",
-        run: flexible_density::table5,
+        run: |_| flexible_density::table5(),
     },
     Experiment {
         name: "tg-shapes",
         about: "shapes of personal space under socialization features (TG Figs 13 and 14)",
-        run: social_shapes::shapes,
+        run: |_| social_shapes::shapes(),
     },
     Experiment {
         name: "tg-groups",
         about: "groups by triangulation, and a group's own space (TG Figs 11, 12 and 15)",
-        run: social_groups::groups,
+        run: |_| social_groups::groups(),
     },
 ];
 
@@ -66,7 +83,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
         return Ok(Answer::Yes);
     }
     let experiment = find(&arguments.name)?;
-    let table = (experiment.run)()?;
+    let table = (experiment.run)(arguments.seeds)?;
     if arguments.json {
         print_json(&table.json(experiment.name, experiment.about))?;
     } else {
@@ -112,7 +129,7 @@ mod tests {
     #[test]
     fn every_experiment_runs_and_explains_what_differs() {
         for one in EXPERIMENTS {
-            let table = (one.run)().unwrap();
+            let table = (one.run)(1).unwrap();
             assert!(!table.rows.is_empty(), "{}", one.name);
             for row in &table.rows {
                 assert!(

@@ -27,6 +27,8 @@ pub(super) struct Cell {
     printed: Option<Figure>,
     /// How far apart the two may lie.
     tolerance: f64,
+    /// The standard deviation of ours over repetitions, where there were some.
+    deviation: Option<f64>,
 }
 
 /// What stands in a cell.
@@ -42,6 +44,7 @@ impl Cell {
             ours: Figure::Number(ours),
             printed: None,
             tolerance: 0.0,
+            deviation: None,
         }
     }
 
@@ -50,6 +53,15 @@ impl Cell {
             ours: Figure::Number(ours),
             printed: Some(Figure::Number(printed)),
             tolerance,
+            deviation: None,
+        }
+    }
+
+    /// Says by how much ours deviates from repetition to repetition.
+    pub(super) fn deviating(self, deviation: f64) -> Self {
+        Self {
+            deviation: Some(deviation),
+            ..self
         }
     }
 
@@ -58,6 +70,7 @@ impl Cell {
             ours: Figure::Text(ours.into()),
             printed: None,
             tolerance: 0.0,
+            deviation: None,
         }
     }
 
@@ -66,6 +79,7 @@ impl Cell {
             ours: Figure::Text(ours.into()),
             printed: Some(Figure::Text(printed.into())),
             tolerance: 0.0,
+            deviation: None,
         }
     }
 
@@ -80,24 +94,34 @@ impl Cell {
     }
 
     fn text_form(&self) -> String {
+        let mut text = self.ours.text_form();
+        if let Some(deviation) = self.deviation {
+            // Writing to a string does not fail.
+            let _ = write!(text, " ({deviation:.2})");
+        }
         match &self.printed {
-            None => self.ours.text_form(),
+            None => text,
             Some(printed) => {
                 let mark = if self.agrees() { "" } else { " !" };
-                format!("{} | {}{mark}", self.ours.text_form(), printed.text_form())
+                format!("{text} | {}{mark}", printed.text_form())
             }
         }
     }
 
     fn json_form(&self) -> Value {
-        match &self.printed {
-            None => self.ours.json_form(),
-            Some(printed) => json!({
+        let mut form = match (&self.printed, self.deviation) {
+            (None, None) => return self.ours.json_form(),
+            (None, _) => json!({ "ours": self.ours.json_form() }),
+            (Some(printed), _) => json!({
                 "ours": self.ours.json_form(),
                 "printed": printed.json_form(),
                 "agrees": self.agrees(),
             }),
+        };
+        if let Some(deviation) = self.deviation {
+            form["deviation"] = json!(deviation);
         }
+        form
     }
 }
 

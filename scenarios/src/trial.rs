@@ -1,0 +1,205 @@
+//! One drive of the robot through a scenario to a place: the world, social mapping and navigation in one
+//! process, without a graph. What experiments repeat many times over. This file guarantees that a trial is
+//! a function of its scenario and seed, to the bit.
+//!
+//! People and objects are known as they are, so that a trial shows what planning and control do (TD
+//! section 6.1); the laser and the localisation have the scenario's noise.
+
+use crate::metrics::mapped;
+use crate::scenario::Scenario;
+use crate::world::{Inputs as WorldInputs, Truth, World};
+use agents::navigation::control::Limits;
+use agents::navigation::navigator::{Config, Inputs, Navigator, Status};
+use agents::navigation::people::Person;
+use agents::navigation::target::{Target, Task};
+use agents::social_mapping::scene::{Activity, Manner, Person as MappedPerson, SceneError};
+use agents::social_mapping::{ConfigError, SocialConfig, SocialMapper, SocialScene};
+use nalgebra::{Isometry2, Point2};
+
+/// From one turn of everything to the next, s.
+const STEP: f64 = 0.1;
+/// Social mapping takes a turn every so many steps.
+const MAPPING: usize = 5;
+
+/// A trial to make.
+#[derive(Debug, Clone)]
+pub struct Trial<'a> {
+    /// Where and among whom.
+    pub scenario: &'a Scenario,
+    /// What its noise grows from.
+    pub seed: u64,
+    /// Whether people and objects are more than obstacles.
+    pub social: bool,
+    /// Where the robot is to get.
+    pub goal: Point2<f64>,
+    /// The figures of navigation.
+    pub navigation: Config,
+    /// From this second on the robot knows the scenario's agenda; before, it knows none.
+    pub agenda_from: f64,
+}
+
+/// What came of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Drive {
+    /// What was true, step by step.
+    pub samples: Vec<Truth>,
+    /// Whether the robot got there within the scenario's duration.
+    pub arrived: bool,
+    /// How many paths it took up.
+    pub plans: u64,
+}
+
+/// Why a trial cannot be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TrialError {
+    /// The figures of social mapping are unusable.
+    #[error("{}", .problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]
+    Config {
+        /// All that is wrong with them.
+        problems: Vec<ConfigError>,
+    },
+    /// The scenario makes no map.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+}
+
+impl Trial<'_> {
+    /// Drives until the robot is there or the scenario's time is up.
+    ///
+    /// # Errors
+    /// [`TrialError`] where there is no social map of the scenario.
+    pub fn drive(&self) -> Result<Drive, TrialError> {
+        let scenario = self.scenario;
+        let mut world = World::new(scenario, self.seed, None);
+        let mut mapper = SocialMapper::new(SocialConfig::default())
+            .map_err(|problems| TrialError::Config { problems })?;
+        let mut scene = self.scene();
+        let mut navigator = Navigator::new(self.navigation);
+        let task = Task {
+            id: "trial".to_owned(),
+            target: Target::Point(self.goal),
+        };
+        let robot = &scenario.robot;
+        let limits = Limits {
+            radius: robot.radius,
+            max_speed: robot.max_speed,
+            max_turn: robot.max_turn,
+            acceleration: robot.max_acceleration,
+            turn_acceleration: robot.max_turn_acceleration,
+        };
+        let mut samples = vec![world.truth()];
+        let (mut scan, mut odometry, mut grid) = (None, None, None);
+        let mut command = None;
+        let mut arrived = false;
+        for step in 0..(scenario.duration / STEP) as usize {
+            let outputs = world.step(
+                STEP,
+                &WorldInputs {
+                    velocity: command,
+                    speech: Vec::new(),
+                },
+            );
+            scan = outputs.scan.or(scan);
+            odometry = outputs.odometry.or(odometry);
+            let truth = outputs.truth;
+            if step % MAPPING == 0 {
+                if step as f64 * STEP >= self.agenda_from && scene.activities.is_empty() {
+                    scene.activities = self.agenda();
+                }
+                scene.people = truth.people.iter().map(mapped_person).collect();
+                grid = Some(mapper.update(truth.time, &scene)?.grid);
+            }
+            let people: Vec<Person> = truth.people.iter().map(known_person).collect();
+            let now = truth.time;
+            samples.push(truth);
+            let output = navigator.step(
+                now,
+                &Inputs {
+                    odometry: odometry.as_ref(),
+                    scan: scan.as_ref(),
+                    grid: grid.as_deref(),
+                    walls: &scenario.walls,
+                    people: &people,
+                    task: Some(&task),
+                    limits,
+                    social: self.social,
+                },
+            );
+            command = Some(output.command);
+            arrived = output.status == Status::Arrived;
+            if arrived || matches!(output.status, Status::Failed(_)) {
+                break;
+            }
+        }
+        Ok(Drive {
+            samples,
+            arrived,
+            plans: navigator.plans(),
+        })
+    }
+
+    fn agenda(&self) -> Vec<Activity> {
+        let activities = self.scenario.activities.iter().map(|activity| Activity {
+            object: activity.object.clone(),
+            start: activity.start,
+            end: activity.end,
+        });
+        activities.collect()
+    }
+
+    /// All that does not move.
+    fn scene(&self) -> SocialScene {
+        SocialScene {
+            bounds: self.scenario.bounds,
+            walls: self.scenario.walls.clone(),
+            robot_radius: self.scenario.robot.radius,
+            social: self.social,
+            objects: self.scenario.objects.iter().map(mapped).collect(),
+            ..SocialScene::default()
+        }
+    }
+}
+
+fn mapped_person(body: &crate::world::Body) -> MappedPerson {
+    MappedPerson {
+        name: body.name.clone(),
+        world_from_person: Isometry2::new(body.position.coords, body.heading),
+        velocity: body.velocity,
+        radius: body.radius,
+        manner: Manner::default(),
+    }
+}
+
+fn known_person(body: &crate::world::Body) -> Person {
+    Person {
+        name: body.name.clone(),
+        world_from_person: Isometry2::new(body.position.coords, body.heading),
+        velocity: body.velocity,
+        radius: body.radius,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_trial_gets_there_and_is_the_same_to_the_bit() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("care-centre");
+        let mut scenario = Scenario::load(&folder).unwrap();
+        scenario.duration = 40.0;
+        let trial = Trial {
+            scenario: &scenario,
+            seed: 3,
+            social: true,
+            goal: Point2::new(4.0, 6.0),
+            navigation: Config::default(),
+            agenda_from: 0.0,
+        };
+        let drive = trial.drive().unwrap();
+        assert!(drive.arrived);
+        let last = drive.samples.last().unwrap().world_from_robot;
+        assert!((last.translation.vector - trial.goal.coords).norm() < 0.3);
+        assert_eq!(trial.drive().unwrap(), drive);
+    }
+}

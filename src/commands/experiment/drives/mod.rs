@@ -1,0 +1,26 @@
+//! Paper TD's Tables 1 and 2, driven again: the robot among people at their activities, with and without
+//! social behaviour. The geometry of each scene is set so that the way without social behaviour is as long as
+//! printed; everything else follows from planning and control.
+
+mod gains;
+mod tables;
+
+pub(super) use gains::gains;
+pub(super) use tables::{table1, table2};
+
+use crate::Failure;
+use scenarios::Scenario;
+
+/// The scenario of that text.
+fn scene(name: &str, text: &str) -> Result<Scenario, Failure> {
+    let no_file = |_: &str| Ok(String::new());
+    Scenario::parse(name, text, &no_file).map_err(Failure::internal)
+}
+
+/// Mean and standard deviation; of one value there is none.
+fn spread(values: &[f64]) -> (f64, f64) {
+    let count = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    (mean, (squares / (count - 1.0).max(1.0)).sqrt())
+}
