@@ -14,6 +14,9 @@ const CROWD: usize = 2000;
 /// Cells along the longer side, at most: about a pixel each.
 const MOST: usize = 800;
 
+/// How far a row of cells reaches into the one below, px.
+const OVERLAP: f64 = 0.4;
+
 /// Whether there are too many people to draw each.
 pub(super) fn is_crowd(update: &Update) -> bool {
     update.people.len() > CROWD
@@ -44,7 +47,9 @@ impl Cells {
                     view.page(self.origin + step)
                 };
                 let (low, high) = (corner(start, row), corner(column, row + 1));
-                let piece = rectangle(low.x, high.y, high.x - low.x, low.y - high.y);
+                let (width, height) = (high.x - low.x, low.y - high.y);
+                // Into the row below, which is drawn already: rounded to pixels, rows may leave gaps.
+                let piece = rectangle(low.x, high.y, width, height + OVERLAP);
                 group = group.add(piece.set("fill", colour));
             }
         }

@@ -177,7 +177,7 @@ pub(super) fn column(
         column = column.add(words(
             0.0,
             y,
-            &format!("{left_out} items left out or mended"),
+            &format!("left out or mended: {left_out}"),
             FAINT,
         ));
         y += LINE;
