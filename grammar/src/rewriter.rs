@@ -212,6 +212,10 @@ impl Rewriter {
         if !found? {
             return Ok(false);
         }
+        // Quantified variables had the slots of nodes that are yet to be made.
+        for &(slot, _) in &self.creates {
+            self.environment[slot] = Slot::Unbound;
+        }
         for link in &self.unlinks {
             if let Some(key) = self.key(link) {
                 graph.unlink(key);

@@ -107,3 +107,17 @@ fn given_nodes_are_kept() {
         [NodeId(2)]
     );
 }
+
+#[test]
+fn a_new_node_is_none_of_those_that_a_quantifier_tried() {
+    let world = graph(
+        &[("box", "x"), ("box", "y")],
+        &[("x", "on", "x"), ("y", "on", "y")],
+    );
+    let snapshot = world.snapshot();
+    let body = "{ a:box } => { a:box c:box c->c(on)* } precondition { (forall q:box (on a a)) }";
+    let mut rewriter = Rewriter::new(&rule(body), "r", &snapshot).unwrap();
+    let mut working = WorkingGraph::of(&snapshot).unwrap();
+    assert!(rewriter.rewrite(&mut working, &[]).unwrap());
+    assert_eq!(working.edges().count(), 2);
+}
