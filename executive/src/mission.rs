@@ -76,6 +76,8 @@ struct Turn<'a> {
     now: Time,
     snapshot: &'a Snapshot,
     goal: &'a Goal,
+    /// Whether planning shall end at once.
+    interrupted: &'a dyn Fn() -> bool,
 }
 
 impl<P: Planner> Executive<P> {
@@ -135,6 +137,20 @@ impl<P: Planner> Executive<P> {
     /// # Errors
     /// [`ReadError`]: take a new snapshot; nothing was decided.
     pub fn step(&mut self, now: Time, snapshot: &Snapshot) -> Result<Vec<Transaction>, ReadError> {
+        self.step_unless(now, snapshot, &|| false)
+    }
+
+    /// As [`Self::step`], but planning ends without a plan as soon as `interrupted` says so, which is
+    /// asked every few states: the next turn plans again, if there is still something to plan.
+    ///
+    /// # Errors
+    /// As for [`Self::step`].
+    pub fn step_unless(
+        &mut self,
+        now: Time,
+        snapshot: &Snapshot,
+        interrupted: &dyn Fn() -> bool,
+    ) -> Result<Vec<Transaction>, ReadError> {
         self.follow_rules(now, snapshot)?;
         let mut missions = record::missions(snapshot)?;
         let mut transactions = self.announce(now, snapshot, &missions)?;
@@ -155,7 +171,7 @@ impl<P: Planner> Executive<P> {
             };
         }
         let mut after = before.clone();
-        self.pursue(now, snapshot, &mut after)?;
+        self.pursue(now, snapshot, &mut after, interrupted)?;
         self.interest = self.interest(snapshot, &after)?;
         transactions.extend(record::difference(&before, &after, snapshot.version()));
         transactions.extend(self.wake(snapshot, &before, &after)?);

@@ -8,6 +8,7 @@ use dsr::{
     TurnError, Turns, Update, Version,
 };
 use grammar::Grammar;
+use std::cell::RefCell;
 use std::time::Duration;
 use thiserror::Error;
 
@@ -73,7 +74,17 @@ pub fn run_with<P: Planner>(
     };
     while let Some(now) = pace.next(&mut session, &core, looked)? {
         let snapshot = session.snapshot()?;
-        let decided = core.step(now, &snapshot);
+        let decided = if pace.turns.in_lockstep() {
+            core.step(now, &snapshot)
+        } else {
+            let asks = RefCell::new(Asks {
+                session: &mut session,
+                turns: &mut pace.turns,
+                looked: snapshot.version(),
+                found: false,
+            });
+            core.step_unless(now, &snapshot, &|| asks.borrow_mut().any())
+        };
         for entry in core.take_journal() {
             tracing::info!(time = %entry.time, why = entry.why, "{}", entry.what);
         }
@@ -94,6 +105,33 @@ pub fn run_with<P: Planner>(
         }
     }
     Ok(())
+}
+
+/// What may come up while a plan is sought.
+struct Asks<'a> {
+    session: &'a mut Session,
+    turns: &'a mut Turns,
+    looked: Version,
+    found: bool,
+}
+
+impl Asks<'_> {
+    /// Whether something is asked of a mission since the turn began, or the process shall end.
+    fn any(&mut self) -> bool {
+        if self.found || self.turns.ended() {
+            return true;
+        }
+        // What cannot be read now, the next turn meets.
+        let Ok(snapshot) = self.session.snapshot() else {
+            return false;
+        };
+        if std::mem::replace(&mut self.looked, snapshot.version()) == snapshot.version() {
+            return false;
+        }
+        let missions = crate::missions(&snapshot).unwrap_or_default();
+        self.found = missions.iter().any(|mission| !mission.request.is_empty());
+        self.found
+    }
 }
 
 /// The version that was looked at last, and when.

@@ -16,7 +16,7 @@ pub(super) enum Sought {
     Plan(Vec<Step>),
     /// There is none, and why.
     Nothing(String),
-    /// The last one was sought too short a time ago.
+    /// The last one was sought too short a time ago, or seeking it was interrupted.
     NotNow,
 }
 
@@ -30,9 +30,16 @@ impl<P: Planner> Executive<P> {
         let mut options = self.config.options.clone();
         options.raised.extend(raised);
         let grammar = outcomes::learned(&self.grammar, turn.snapshot)?;
-        let outcome = self
-            .planner
-            .plan(&grammar, turn.snapshot, turn.goal, &options)?;
+        let outcome = self.planner.plan(
+            &grammar,
+            turn.snapshot,
+            turn.goal,
+            &options,
+            turn.interrupted,
+        )?;
+        if outcome.status == Status::Limit && (turn.interrupted)() {
+            return Ok(Sought::NotNow);
+        }
         let sought = match outcome.status {
             Status::Solved => steps(turn.now, &outcome),
             Status::Unsolvable | Status::Limit => {

@@ -17,6 +17,7 @@ impl<P: Planner> Executive<P> {
         now: Time,
         snapshot: &Snapshot,
         mission: &mut Mission,
+        interrupted: &dyn Fn() -> bool,
     ) -> Result<(), ReadError> {
         let goal = match self.goal(&mission.goal) {
             Ok(goal) => goal,
@@ -29,6 +30,7 @@ impl<P: Planner> Executive<P> {
             now,
             snapshot,
             goal: &goal,
+            interrupted,
         };
         match self.grammar.goal_holds(snapshot, &goal) {
             Ok(None) => {}
@@ -63,6 +65,7 @@ impl<P: Planner> Executive<P> {
             now,
             snapshot,
             goal,
+            ..
         } = turn;
         let open = open(mission);
         if open.is_empty()

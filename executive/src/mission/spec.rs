@@ -49,7 +49,8 @@ impl MissionSpec {
 
 /// Makes plans.
 pub trait Planner {
-    /// A plan from the snapshot to the goal, or why there is none.
+    /// A plan from the snapshot to the goal, or why there is none. Once `interrupted` says so, it
+    /// ends at once, as at a limit.
     ///
     /// # Errors
     /// [`ReadError`] where the snapshot cannot be read.
@@ -59,6 +60,7 @@ pub trait Planner {
         snapshot: &Snapshot,
         goal: &Goal,
         options: &Options,
+        interrupted: &dyn Fn() -> bool,
     ) -> Result<Outcome, ReadError>;
 }
 
@@ -83,8 +85,11 @@ impl Planner for RulePlanner {
         snapshot: &Snapshot,
         goal: &Goal,
         options: &Options,
+        interrupted: &dyn Fn() -> bool,
     ) -> Result<Outcome, ReadError> {
-        let mut limits = Limits::new().with_expansions(self.expansions);
+        let elapsed = || if interrupted() { f64::INFINITY } else { 0.0 };
+        let limits = Limits::new().with_expansions(self.expansions);
+        let mut limits = limits.with_clock(f64::MAX, elapsed);
         crate::plan(grammar, snapshot, goal, options, &mut limits)
     }
 }

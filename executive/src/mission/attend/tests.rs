@@ -119,3 +119,37 @@ fn a_mission_gives_way_at_once_between_steps_or_never() {
     "#]]
     .assert_debug_eq(&preempted(Preemption::Never));
 }
+
+#[test]
+fn a_mission_that_is_cancelled_while_it_is_planned_is_over_in_the_next_turn() {
+    let mut house = House::new(&[("go", GO_TO_WARD, 0)]);
+    house.turn();
+    let planned = house.planner.asked.get();
+    let snapshot = house.graph.snapshot();
+    let decided = house
+        .executive
+        .step_unless(house.now, &snapshot, &|| true)
+        .unwrap();
+    for transaction in &decided {
+        let committed = house.graph.commit(transaction, "executive", house.now);
+        committed.unwrap();
+    }
+    assert_eq!(house.planner.asked.get(), planned + 1);
+    expect!["running, 0: "].assert_eq(&house.mission("go"));
+    expect![""].assert_eq(&house.steps());
+    ask(&mut house, "go", "cancel");
+    house.turn();
+    expect!["cancelled, 0: cancelled on request"].assert_eq(&house.mission("go"));
+    assert_eq!(house.planner.asked.get(), planned + 1);
+}
+
+#[test]
+fn a_mission_whose_planning_was_interrupted_is_planned_in_the_next_turn() {
+    let mut house = House::new(&[("go", GO_TO_WARD, 0)]);
+    house.turn();
+    let snapshot = house.graph.snapshot();
+    let decided = house.executive.step_unless(house.now, &snapshot, &|| true);
+    assert!(house.steps().is_empty() && decided.is_ok());
+    house.run(12);
+    expect!["succeeded, 0: the goal holds"].assert_eq(&house.mission("go"));
+}

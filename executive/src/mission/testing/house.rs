@@ -31,9 +31,11 @@ impl Planner for Counting {
         snapshot: &Snapshot,
         goal: &Goal,
         options: &Options,
+        interrupted: &dyn Fn() -> bool,
     ) -> Result<Outcome, ReadError> {
         self.asked.set(self.asked.get() + 1);
-        self.planner.plan(grammar, snapshot, goal, options)
+        self.planner
+            .plan(grammar, snapshot, goal, options, interrupted)
     }
 }
 
