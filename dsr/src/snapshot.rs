@@ -240,7 +240,11 @@ impl Snapshot {
     ///
     /// # Errors
     /// [`ReadError`], as for every read of a snapshot.
-    #[inline]
+    #[allow(
+        clippy::inline_always,
+        reason = "handing the result over in memory takes as long as finding it"
+    )]
+    #[inline(always)]
     pub fn find_node(&self, id: NodeId) -> Result<Option<Node<'_>>, ReadError> {
         let found = match self.record(id) {
             Ok(Some((address, words))) => self.node_at(address, words),

@@ -118,7 +118,11 @@ impl<'a> Element<'a> {
     ///
     /// # Errors
     /// [`ReadError`].
-    #[inline]
+    #[allow(
+        clippy::inline_always,
+        reason = "handing the result over in memory takes as long as reading it"
+    )]
+    #[inline(always)]
     pub fn attribute(&self, name: AttributeId) -> Result<Option<Attribute>, ReadError> {
         let words = match self.find(name) {
             Ok(Some(words)) => words,
