@@ -296,7 +296,7 @@ impl Session {
                 }
             };
             let hot = self.hot_of((epoch, &arena), &schema)?;
-            return Ok(Snapshot::new(Arc::clone(&arena), root, schema).with_hot(hot));
+            return Ok(Snapshot::new(arena, root, schema).with_hot(hot));
         }
     }
 
