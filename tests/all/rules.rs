@@ -255,6 +255,18 @@ fn rules_beside_a_broken_one_are_used_and_the_broken_one_is_told() {
 }
 
 #[test]
+fn a_rule_that_can_never_be_applied_is_told_once_also_where_a_world_is_given() {
+    let never = "dormant late : passive(1)\n{\n\t{ r:robot }\n\t=>\n\t{ r:robot }\n}\n";
+    let text = format!("{RULES}{never}");
+    let folder = Folder::new(&[("a.aggl", text.as_str()), ("world", WORLD)]);
+    for rest in [&[][..], &["--world"][..]] {
+        let (_, out, err) = rules(&folder, "check", "a.aggl", rest);
+        let told = format!("{out}{err}");
+        assert_eq!(told.matches("can never be applied").count(), 1, "{told}");
+    }
+}
+
+#[test]
 fn a_file_that_is_not_there_is_bad_input() {
     let folder = Folder::new(&[]);
     for verb in ["check", "list", "fmt"] {

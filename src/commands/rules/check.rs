@@ -6,7 +6,7 @@ use crate::commands::output::{print, print_json};
 use crate::commands::read_text;
 use crate::{Answer, Failure};
 use dsr::{Graph, Manifest, Schema, Time, json};
-use grammar::{Conflict, Defects, Diagnostic, Grammar, SourceFile};
+use grammar::{Conflict, Defects, Diagnostic, Grammar, Problem, SourceFile};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -58,12 +58,15 @@ pub(super) fn check(
         diagnostics.extend(check_manifest(&grammar, schema.as_ref(), manifest)?);
     }
     let broken = grammar::has_errors(&diagnostics);
-    diagnostics.extend(grammar.analyse(schema.as_ref()));
+    let mut analysed = grammar.analyse(schema.as_ref());
     if let Some(world) = beside.world {
         let graph = read_graph(world)?;
         let unreachable = grammar.unreachable(&graph.snapshot());
-        diagnostics.extend(unreachable.map_err(Failure::internal)?);
+        // The world tells more of what can be applied than the rules alone do: which are awake.
+        analysed.retain(|found| !matches!(found.problem, Problem::Unreachable { .. }));
+        analysed.extend(unreachable.map_err(Failure::internal)?);
     }
+    diagnostics.extend(analysed);
     let found = if conflicts || as_json {
         grammar.conflicts()
     } else {
