@@ -2,7 +2,9 @@
 //! that a missing one reads `-`.
 
 use super::Report;
-use crate::metrics::{CHC_STEP, MOVING, Metrics, PersonMetrics, Psi, RobotMetrics};
+use crate::metrics::{
+    CHC_STEP, Company, MOVING, Metrics, Motion, PersonMetrics, Psi, RobotMetrics,
+};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -55,55 +57,45 @@ impl Runs<'_> {
     /// Figures of how evenly the robot moved, and how near it came to people on the whole.
     fn conduct(&self) -> Vec<Row> {
         let both =
-            |mean: f64, greatest: f64| Some(format!("{} ({})", fixed(mean, 2), fixed(greatest, 2)));
+            |mean: f64, greatest: f64| format!("{} ({})", fixed(mean, 2), fixed(greatest, 2));
+        let motion = |label: &str, unit: &'static str, figure: &dyn Fn(&Motion) -> String| {
+            self.row(label, unit, |metrics| metrics.motion.as_ref().map(figure))
+        };
+        let company = |label: &str, unit: &'static str, figure: &dyn Fn(&Company) -> String| {
+            self.row(label, unit, |metrics| metrics.company.as_ref().map(figure))
+        };
         vec![
-            self.row("mean speed (greatest)", "m/s", |metrics| {
-                metrics
-                    .motion
-                    .and_then(|motion| both(motion.mean_speed, motion.max_speed))
+            motion("mean speed (greatest)", "m/s", &|motion| {
+                both(motion.mean_speed, motion.max_speed)
             }),
-            self.row("mean acceleration (greatest)", "m/s2", |metrics| {
-                metrics
-                    .motion
-                    .and_then(|motion| both(motion.mean_acceleration, motion.max_acceleration))
+            motion("mean acceleration (greatest)", "m/s2", &|motion| {
+                both(motion.mean_acceleration, motion.max_acceleration)
             }),
-            self.row("mean jerk (greatest)", "m/s3", |metrics| {
-                metrics
-                    .motion
-                    .and_then(|motion| both(motion.mean_jerk, motion.max_jerk))
+            motion("mean jerk (greatest)", "m/s3", &|motion| {
+                both(motion.mean_jerk, motion.max_jerk)
             }),
-            self.row("stalled", "s", |metrics| {
-                metrics.motion.map(|motion| fixed(motion.stalled, 1))
+            motion("stalled", "s", &|motion| fixed(motion.stalled, 1)),
+            company("distance to the nearest, mean (least)", "m", &|company| {
+                both(company.mean_distance, company.min_distance)
             }),
-            self.row("distance to the nearest, mean (least)", "m", |metrics| {
-                metrics
-                    .company
-                    .and_then(|company| both(company.mean_distance, company.min_distance))
-            }),
-            self.row("the same between surfaces", "m", |metrics| {
-                metrics
-                    .company
-                    .and_then(|company| both(company.mean_clearance, company.min_clearance))
+            company("the same between surfaces", "m", &|company| {
+                both(company.mean_clearance, company.min_clearance)
             }),
             self.row("least time to a collision", "s", |metrics| {
-                metrics
+                let time = metrics
                     .company
-                    .and_then(|company| company.time_to_collision)
-                    .map(|time| fixed(time, 1))
+                    .and_then(|company| company.time_to_collision);
+                time.map(|time| fixed(time, 1))
             }),
-            self.row(
+            company(
                 "share of time with 0.5 m of space for all",
                 "%",
-                |metrics| {
-                    metrics
-                        .company
-                        .map(|company| fixed(company.space_compliance, 1))
-                },
+                &|company| fixed(company.space_compliance, 1),
             ),
-            self.row(
+            company(
                 "share of time between the members of a group",
                 "%",
-                |metrics| metrics.company.map(|company| fixed(company.psi_groups, 1)),
+                &|company| fixed(company.psi_groups, 1),
             ),
         ]
     }
