@@ -21,6 +21,10 @@ use crate::graph::Writer;
 pub(crate) const NODE_HEADER: usize = 7;
 /// The word of a node's header that says which version changed the node last.
 pub(crate) const VERSION: usize = 3;
+/// The word of a node's header that leads to the edges that start there.
+pub(crate) const TARGETS: usize = 4;
+/// The word of a node's header that leads to the edges that end there.
+pub(crate) const SOURCES: usize = 5;
 /// The word of a node's header that says since which version the record is the node's.
 pub(crate) const SINCE: usize = 6;
 pub(crate) const EDGE_HEADER: usize = 4;

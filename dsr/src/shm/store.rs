@@ -234,14 +234,19 @@ impl Store {
     pub fn commit(&mut self, transaction: &Transaction, time: Time) -> Result<Commit, Refusal> {
         let answer = self.decide(transaction, STORE, time, None);
         self.tell();
-        let due = self.news.is_due_at_last();
-        self.ring_if(due);
+        self.ring_at_last();
         self.settle();
         answer
     }
 
-    fn ring_if(&self, due: bool) {
-        if due {
+    fn ring_after_look(&mut self) {
+        if self.news.is_due_after_look() {
+            bell::ring(self.graph.arena());
+        }
+    }
+
+    fn ring_at_last(&mut self) {
+        if self.news.is_due_at_last() {
             bell::ring(self.graph.arena());
         }
     }
@@ -377,21 +382,18 @@ impl Store {
                     break;
                 }
             }
-            let due = self.news.is_due_after_look();
-            self.ring_if(due);
+            self.ring_after_look();
             if served > 0 {
                 self.is_busy = true;
                 return Ok(served);
             }
             std::hint::spin_loop();
         }
-        let due = self.news.is_due_at_last();
-        self.ring_if(due);
+        self.ring_at_last();
         self.sleep(patience)?;
         self.welcome(now())?;
         let served = self.answer_desks() + self.answer_all()?;
-        let due = self.news.is_due_after_look();
-        self.ring_if(due);
+        self.ring_after_look();
         self.is_busy = served > 0;
         Ok(served)
     }

@@ -2,6 +2,7 @@
 //! error that says why.
 
 use super::{Node, Snapshot};
+use crate::arena::record::{SOURCES, TARGETS};
 use crate::arena::tree::{self, Entry, Key, Range};
 use crate::arena::{Address, ReadError, Word, record};
 use crate::{EdgeKey, LabelId, NodeId, TypeId};
@@ -156,11 +157,6 @@ impl<'a> Node<'a> {
         TypedIds(self.adjacent(SOURCES, [label.0; 2]))
     }
 }
-
-/// Which word of a node's record leads to the edges that start there.
-const TARGETS: usize = 4;
-/// Which word of a node's record leads to the edges that end there.
-const SOURCES: usize = 5;
 
 impl Snapshot {
     /// Where edges of a label that start at a node end, with the nodes' exact types: of those from an id

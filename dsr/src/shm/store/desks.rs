@@ -163,8 +163,7 @@ impl Store {
             self.news.answered();
         }
         desk.request.transactions.clear();
-        let due = self.news.is_due_after_look();
-        self.ring_if(due);
+        self.ring_after_look();
         self.settle();
         true
     }
