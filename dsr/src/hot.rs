@@ -1,11 +1,13 @@
 //! Attributes that change faster than commits are worth: their one owner writes them into a page of
 //! its own, over and over, and everybody reads them there. This file owns the page's layout and the
-//! protocol by which a value is read whole or not at all (a seqlock); it knows no process.
+//! protocol by which the newest value is read whole, also while its owner is stopped or dies in the
+//! middle of the next (a seqlock over two cells in turn); it knows no process.
 //!
-//! Page, in words: 0 magic, 1 the owner's session, 2 slots in use; from 16 on, slots of 16.
-//! Slot: 0 sequence (odd while it is written), 1 to 3 whose (node, 0, attribute; or source, target,
-//! `attribute | label << 16 | 1 << 32`), 4 epoch, from 5 on the attribute as in a record's table. Words
-//! 1 to 3 are written once, before the slot is in use.
+//! Page, in words: 0 magic, 1 the owner's session, 2 slots in use; from 16 on, slots of 32.
+//! Slot: 0 how many values were written, 1 to 3 whose (node, 0, attribute; or source, target,
+//! `attribute | label << 16 | 1 << 32`), from 4 and from 16 on a cell each. Cell: 0 epoch, from 1 on the
+//! attribute as in a record's table. Words 1 to 3 are written once, before the slot is in use. Value n
+//! is in cell n mod 2.
 
 use crate::arena::protocol::Atomic;
 use crate::arena::table::AttributeRecord;
@@ -16,21 +18,21 @@ use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
 
 /// Hot attributes that one owner can have.
 pub(crate) const SLOTS: usize = 64;
-const SLOT_WORDS: usize = 16;
+const SLOT_WORDS: usize = 32;
 const FIRST_SLOT: usize = 16;
 /// Words of a page.
 pub(crate) const PAGE_WORDS: usize = FIRST_SLOT + SLOTS * SLOT_WORDS;
-const MAGIC: u64 = u64::from_le_bytes(*b"cortexH1");
+const MAGIC: u64 = u64::from_le_bytes(*b"cortexH2");
 /// Epoch and attribute: a header of three words and seven of value at the most.
 const CONTENT: usize = 11;
-/// How often a reader tries before it takes it that the owner died while it wrote.
+/// How often a reader tries: it tries again only where two more values came while it read one.
 const PATIENCE: u32 = 10_000;
 
 mod at {
     pub(super) const SESSION: usize = 1;
     pub(super) const USED: usize = 2;
     pub(super) const KEY: usize = 1;
-    pub(super) const CONTENT: usize = 4;
+    pub(super) const CELLS: [usize; 2] = [4, 16];
 }
 
 /// Whose attribute a slot holds.
@@ -152,31 +154,35 @@ pub(crate) fn write<W: Atomic>(
     scratch.clear();
     scratch.push(epoch.0);
     AttributeRecord::encode(scratch, value, (0, time, 0), None);
-    let sequence = slot[0].load(Relaxed);
-    // Who sees any of what follows sees that the sequence is odd.
-    slot[0].store(sequence | 1, Relaxed);
+    let count = slot[0].load(Relaxed).wrapping_add(1);
+    // Who sees any of what follows sees that the cell's last value is no longer the newest.
     W::fence(Release);
-    for (to, from) in slot[at::CONTENT..].iter().zip(scratch.iter()) {
+    for (to, from) in cell(slot, count).iter().zip(scratch.iter()) {
         to.store(*from, Relaxed);
     }
-    // An owner that died in the middle and came again left an odd one.
-    slot[0].store((sequence | 1).wrapping_add(1), Release);
+    slot[0].store(count, Release);
 }
 
-/// The value of an attribute, if the page has it. Never one that was not written so: an owner that is
-/// writing is waited for, for a moment.
+/// Where the value of that number is.
+fn cell<W>(slot: &[W; SLOT_WORDS], count: u64) -> &[W] {
+    let start = at::CELLS[(count & 1) as usize];
+    &slot[start..start + CONTENT]
+}
+
+/// The value of an attribute, if the page has it: the newest at the time of the call or a later one,
+/// never one that was not written so.
 pub(crate) fn read<W: Atomic>(page: &[W], epoch: Epoch, key: Key) -> Option<AttributeRecord> {
     let slot = slot(page, find(page, key)?)?;
     for _ in 0..PATIENCE {
-        let before = slot[0].load(Acquire);
+        let count = slot[0].load(Acquire);
         let mut words = [0; CONTENT];
-        for (to, from) in words.iter_mut().zip(&slot[at::CONTENT..]) {
+        for (to, from) in words.iter_mut().zip(cell(slot, count)) {
             *to = from.load(Relaxed);
         }
         W::fence(Acquire);
-        if before & 1 == 0 && slot[0].load(Relaxed) == before {
+        if slot[0].load(Relaxed) == count {
             // Nothing was written yet, or under another store, whose nodes were others.
-            if before == 0 || words[0] != epoch.0 {
+            if count == 0 || words[0] != epoch.0 {
                 return None;
             }
             return AttributeRecord::decode(&words[1..]);

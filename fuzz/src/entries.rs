@@ -88,14 +88,15 @@ pub fn lease(bytes: &[u8]) {
 /// A page of hot attributes: any words, but for the first, which says that it is one, and a number of
 /// slots in use.
 pub fn hot_page(bytes: &[u8]) {
-    let mut page = vec![u64::from_le_bytes(*b"cortexH1"), 1];
+    let mut page = vec![u64::from_le_bytes(*b"cortexH2"), 1];
     page.extend(words(bytes));
-    page.resize(2048, 0);
-    // Whose attribute the first slot is said to be, and of which epoch.
+    page.resize(4096, 0);
+    // Whose attribute the first slot is said to be, and of which epoch its newest value.
+    let newest = if page[16] & 1 == 0 { 20 } else { 32 };
     let (node, attribute, epoch) = (
         NodeId(page[17]),
         AttributeId(page[19] as u16),
-        Epoch(page[20]),
+        Epoch(page[newest]),
     );
     if let Some(value) = dsr::wire::read_hot_page(&page, epoch, node, attribute) {
         dsr::json::value_to_json(&value);
