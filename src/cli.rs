@@ -4,12 +4,14 @@ mod bench;
 mod graph;
 mod mission;
 mod path;
+mod recording;
 mod social;
 
 pub(crate) use bench::{Bench, BenchAction, BenchPeer};
 pub(crate) use graph::{ExportFormat, Graph, GraphAction, GraphSource, Watch};
 pub(crate) use mission::{Mission, MissionAction, SubmitMission, Why};
 pub(crate) use path::{CostModel, Path, PathAlgorithm};
+pub(crate) use recording::{Record, Replay};
 pub(crate) use social::{Experiment, Social, SocialAction, SocialPicture};
 
 use clap::{Args, Parser, Subcommand};
@@ -63,6 +65,16 @@ pub(crate) enum Verb {
         cortex why 'robot-in->corridor'\n  cortex why ana.position"
     )]
     Why(Why),
+    /// Record a running instance into an MCAP file
+    #[command(after_help = "Ends with the instance, or when it is interrupted.\n\n\
+        Example:\n  cortex record run.mcap --instance default")]
+    Record(Record),
+    /// Play a recording again and tell whether the same graph comes of it; 1 where not
+    #[command(
+        after_help = "Without --instance, --speed and --keep it is played in memory, as fast as the machine can.\n\n\
+        Examples:\n  cortex replay run.mcap\n  cortex replay run.mcap --instance past --speed 5 --keep"
+    )]
+    Replay(Replay),
     /// Measure how fast it is here
     #[command(after_help = "Example:\n  cortex bench graph --json")]
     Bench(Bench),
@@ -139,6 +151,9 @@ pub(crate) struct Run {
     /// Acknowledge every commit only once it is on disk
     #[arg(long, requires = "state")]
     pub(crate) durable: bool,
+    /// Record the run into this MCAP file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) record: Option<PathBuf>,
     /// Folder for report.json, the map and the logs [default: reports/SCENARIO]
     #[arg(long, value_name = "DIR")]
     pub(crate) report: Option<PathBuf>,
@@ -149,7 +164,7 @@ pub(crate) struct Run {
     pub(crate) instance: InstanceArgs,
 }
 
-fn speed(text: &str) -> Result<f64, String> {
+pub(crate) fn speed(text: &str) -> Result<f64, String> {
     let speed: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
     if speed.is_finite() && (0.01..=1000.0).contains(&speed) {
         Ok(speed)

@@ -31,6 +31,8 @@ pub(crate) struct Settings<'a> {
     pub(crate) tracks: Option<&'a Path>,
     /// Where the graph is kept, and whether every commit waits for it.
     pub(crate) state: Option<(&'a Path, bool)>,
+    /// Where the run is recorded.
+    pub(crate) record: Option<&'a Path>,
     pub(crate) logs: PathBuf,
 }
 
@@ -81,6 +83,7 @@ struct Conductor<'a> {
     session: Session,
     _hold: Hold,
     store: usize,
+    recorder: Option<usize>,
     agents: Vec<usize>,
     world: usize,
     /// When the world's time begins: the scenario's start, or later where a state goes on.
@@ -152,6 +155,7 @@ impl<'a> Conductor<'a> {
             session,
             _hold: hold,
             store: 0,
+            recorder: None,
             agents: Vec::new(),
             world: 0,
             start: settings.scenario.start,
@@ -165,6 +169,14 @@ impl<'a> Conductor<'a> {
         conductor.until_ready(conductor.store)?;
         conductor.session.wait_for_store(PATIENCE)?;
         conductor.start = conductor.start.max(conductor.session.snapshot()?.time());
+        // Before the agents, so that it sees all that they do; and so it ends after them.
+        if let Some(file) = settings.record {
+            let recorder = conductor
+                .supervisor
+                .start(conductor.recorder_program(file))?;
+            conductor.until_ready(recorder)?;
+            conductor.recorder = Some(recorder);
+        }
         conductor.progress.say("starting the agents");
         for name in crate::commands::AGENTS {
             let program = conductor.agent_program(name, Policy::Restart);
@@ -198,6 +210,20 @@ impl<'a> Conductor<'a> {
             name: "store".to_owned(),
             arguments,
             policy: Policy::RestartWithGraph,
+        }
+    }
+
+    fn recorder_program(&self, file: &Path) -> Program {
+        let mut arguments: Vec<OsString> =
+            vec!["record".into(), file.into(), "--supervised".into()];
+        arguments.extend(["--instance".into(), self.settings.instance.name().into()]);
+        if self.settings.lockstep {
+            arguments.push("--lockstep".into());
+        }
+        Program {
+            name: crate::commands::record::RECORDER.to_owned(),
+            arguments,
+            policy: Policy::Restart,
         }
     }
 
@@ -246,6 +272,7 @@ impl<'a> Conductor<'a> {
     fn in_lockstep(&mut self) -> Result<bool, ConductError> {
         let mut order = vec![self.world];
         order.extend(&self.agents);
+        order.extend(self.recorder);
         let start = self.start;
         let ticks = (self.settings.scenario.duration / TICK).ceil() as u64;
         let interrupted = self.interrupted;
@@ -376,7 +403,8 @@ impl<'a> Conductor<'a> {
     fn finish(mut self) -> Result<Recording, ConductError> {
         self.recording.missions = self.session.read(executive::missions_with_steps)?;
         let members = std::iter::once(self.store).chain(self.agents.clone());
-        let members: Vec<usize> = members.chain(std::iter::once(self.world)).collect();
+        let others = std::iter::once(self.world).chain(self.recorder);
+        let members: Vec<usize> = members.chain(others).collect();
         self.supervisor.stop();
         self.record()?;
         if self.lost > 0 {

@@ -9,7 +9,10 @@ mod commands;
 mod conduct;
 mod manifests;
 mod progress;
+mod recording;
+mod seen;
 mod supervise;
+mod view;
 
 use clap::Parser;
 use miette::Diagnostic;

@@ -23,9 +23,13 @@ pub(crate) struct GraphSource {
         conflicts_with = "file"
     )]
     pub(crate) instance: String,
-    /// A graph file instead of a running system
+    /// A graph file or a recording instead of a running system
     #[arg(long, value_name = "FILE", global = true)]
     pub(crate) file: Option<PathBuf>,
+    /// Of a recording: as it was then, in seconds since 1970; before the recording, so long after its
+    /// beginning; less than 0, so long before its end. Of `transform` also: see there
+    #[arg(long, value_name = "TIME", global = true, allow_hyphen_values = true)]
+    pub(crate) at: Option<f64>,
     /// For machines
     #[arg(long, global = true)]
     pub(crate) json: bool,
@@ -123,17 +127,16 @@ pub(crate) enum GraphAction {
         schema: Option<PathBuf>,
     },
     /// Print where a node is, seen from another, along the poses
-    #[command(after_help = "Ends with 1 where the graph does not know it.\n\n\
-        Example:\n  cortex graph transform world robot --at -0.5")]
+    #[command(
+        after_help = "With --at TIME, where it was then: in seconds since 1970, or before 0, so long before \
+        the newest version. Ends with 1 where the graph does not know it.\n\n\
+        Example:\n  cortex graph transform world robot --at -0.5"
+    )]
     Transform {
         /// The node to look from
         target: String,
         /// The node to look at
         source: String,
-        /// Then, in seconds since 1970; before 0, so long before the newest version [default: the
-        /// newest poses]
-        #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
-        at: Option<f64>,
     },
 }
 

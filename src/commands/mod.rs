@@ -4,11 +4,13 @@ mod agent;
 mod bench;
 mod doctor;
 mod experiment;
-mod graph;
+pub(crate) mod graph;
 mod mission;
 mod output;
 mod path;
 mod plan;
+pub(crate) mod record;
+mod replay;
 mod rules;
 mod run;
 mod social;
@@ -37,6 +39,8 @@ pub(crate) fn perform(verb: Verb) -> Result<Answer, Failure> {
         Verb::Plan(arguments) => plan::run(&arguments),
         Verb::Mission(arguments) => mission::run(&arguments),
         Verb::Why(arguments) => why::run(&arguments),
+        Verb::Record(arguments) => record::run(&arguments),
+        Verb::Replay(arguments) => replay::run(&arguments),
         Verb::Bench(arguments) => bench::run(&arguments),
         Verb::Path(arguments) => path::run(&arguments),
         Verb::BenchPeer(arguments) => {
@@ -50,6 +54,14 @@ pub(crate) fn perform(verb: Verb) -> Result<Answer, Failure> {
 
 fn instance(name: &str) -> Result<Instance, Failure> {
     Instance::new(name).map_err(Failure::input)
+}
+
+/// The failure for an instance that is not there.
+pub(crate) fn not_running(name: &str) -> Failure {
+    Failure::input_with_help(
+        format!("no instance `{name}` is running"),
+        "start one with `cortex run SCENARIO`, or look at a file with --file",
+    )
 }
 
 fn load_scenario(folder: &Path) -> Result<Scenario, Failure> {

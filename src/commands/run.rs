@@ -38,6 +38,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     if let Some(folder) = &arguments.state {
         super::store::check_state(folder, &scenario, schema)?;
     }
+    if let Some(file) = &arguments.record {
+        // The recorder writes on where there is something; this run begins anew.
+        write(file, &[])?;
+    }
     let spaces = object_spaces(&scenario, &scenario.social).map_err(Failure::input)?;
     let folder = arguments
         .report
@@ -102,6 +106,7 @@ impl Plan<'_> {
                 .as_deref()
                 .filter(|_| !baseline)
                 .map(|folder| (folder, arguments.durable)),
+            record: arguments.record.as_deref().filter(|_| !baseline),
             logs,
         };
         let mut progress = Progress::new(&title, arguments.json);

@@ -22,6 +22,7 @@ mod live_rules;
 mod missions;
 mod path;
 mod plan;
+mod recording;
 mod rules;
 mod run;
 mod social;

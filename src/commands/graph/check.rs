@@ -1,6 +1,6 @@
 //! `cortex graph check`.
 
-use super::source::Source;
+use super::source::{Source, is_recording};
 use crate::cli::GraphSource;
 use crate::commands::output::{print, print_json};
 use crate::commands::read_text;
@@ -12,15 +12,20 @@ use std::path::Path;
 
 pub(super) fn check(source: &GraphSource, schema: Option<&Path>) -> Result<Answer, Failure> {
     let schema = schema.map(read_schema).transpose()?;
-    let (name, text, schema) = match &source.file {
+    let text_file = source.file.as_ref().filter(|_| !is_recording(source));
+    let (name, text, schema) = match text_file {
         Some(path) => (path.display().to_string(), read_text(path)?, schema),
         None => {
-            // A running graph is shown as the file that it would be.
+            // A running or recorded graph is shown as the file that it would be.
             let snapshot = Source::open(source)?.snapshot()?;
             let json = json::to_json(&snapshot).map_err(Failure::internal)?;
             let text = serde_json::to_string_pretty(&json).map_err(Failure::internal)?;
             let schema = schema.or_else(|| Some(snapshot.schema().clone()));
-            (format!("@{}", source.instance), text, schema)
+            let name = source.file.as_ref().map_or_else(
+                || format!("@{}", source.instance),
+                |path| path.display().to_string(),
+            );
+            (name, text, schema)
         }
     };
     let schema = schema.unwrap_or_else(Schema::open);

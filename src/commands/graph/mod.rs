@@ -14,7 +14,7 @@ mod watch;
 mod write;
 
 pub(super) use path::{Path, Thing};
-pub(crate) use source::{attach, no_such, read_graph};
+pub(crate) use source::{attach, name_of, no_such, read_graph};
 
 use crate::cli::{Graph as Arguments, GraphAction};
 use crate::{Answer, Failure};
@@ -38,7 +38,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
         GraphAction::Transform {
             target,
             source: node,
-            at,
-        } => transform::transform(source, target, node, *at),
+        } => transform::transform(source, target, node),
     }
 }

@@ -5,6 +5,7 @@ use crate::Failure;
 use crate::cli::GraphSource;
 use crate::commands::output::tell;
 use crate::commands::{instance, read_text};
+use crate::recording;
 use dsr::interchange::{self, Format, World};
 use dsr::{Commit, Graph, NodeId, NodeRef, Schema, Session, Snapshot, Time, Transaction, json};
 use std::path::{Path, PathBuf};
@@ -17,6 +18,8 @@ const PATIENCE: Duration = Duration::from_secs(2);
 pub(super) enum Source {
     Live(Box<Session>),
     File(Box<FileGraph>),
+    /// As of the end of what was played of a recording.
+    Recording(Box<Graph>),
 }
 
 /// A graph in a file.
@@ -28,13 +31,28 @@ pub(super) struct FileGraph {
 
 impl Source {
     pub(super) fn open(source: &GraphSource) -> Result<Self, Failure> {
+        if source.at.is_some() && !is_recording(source) {
+            return Err(Failure::input_with_help(
+                "only a recording can be looked at as of a time",
+                "name one with --file RUN.mcap; `cortex graph history` tells what a running graph still keeps",
+            ));
+        }
         match &source.file {
+            Some(path) if source.at.is_some() => Self::play(path, source.at),
             Some(path) => Self::open_file(path),
             None => Ok(Self::Live(Box::new(attach(&source.instance)?))),
         }
     }
 
+    fn play(path: &Path, at: Option<f64>) -> Result<Self, Failure> {
+        let graph = recording::played(path, at).map_err(Failure::input)?;
+        Ok(Self::Recording(Box::new(graph)))
+    }
+
     pub(super) fn open_file(path: &Path) -> Result<Self, Failure> {
+        if recording::is_recording(path) {
+            return Self::play(path, None);
+        }
         let (world, graph) = read_world(path)?;
         Ok(Self::File(Box::new(FileGraph {
             path: path.to_owned(),
@@ -47,6 +65,7 @@ impl Source {
         match self {
             Self::Live(session) => session.snapshot().map_err(Failure::internal),
             Self::File(file) => Ok(file.graph.snapshot()),
+            Self::Recording(graph) => Ok(graph.snapshot()),
         }
     }
 
@@ -68,6 +87,10 @@ impl Source {
                 file.save()?;
                 Ok(commit)
             }
+            Self::Recording(_) => Err(CommitFailure::Other(Failure::input_with_help(
+                "a recording is read, not written",
+                "write it as graph JSON: `cortex graph export json --file RUN.mcap`",
+            ))),
         }
     }
 }
@@ -120,14 +143,16 @@ impl FileGraph {
     }
 }
 
+/// Whether the graph is that of a recording.
+pub(super) fn is_recording(source: &GraphSource) -> bool {
+    source.file.as_deref().is_some_and(recording::is_recording)
+}
+
 /// Joins a system that runs.
 pub(crate) fn attach(name: &str) -> Result<Session, Failure> {
     let instance = instance(name)?;
     if !instance.exists() {
-        return Err(Failure::input_with_help(
-            format!("no instance `{name}` is running"),
-            "start one with `cortex run SCENARIO`, or look at a file with --file",
-        ));
+        return Err(crate::commands::not_running(name));
     }
     Session::attach(&instance, crate::manifests::TERMINAL, PATIENCE).map_err(Failure::internal)
 }
@@ -197,7 +222,7 @@ pub(super) fn find_node(snapshot: &Snapshot, text: &str) -> Result<NodeId, Failu
 }
 
 /// A node's name, or its id where it is gone.
-pub(super) fn name_of(snapshot: &Snapshot, id: NodeId) -> String {
+pub(crate) fn name_of(snapshot: &Snapshot, id: NodeId) -> String {
     let node = snapshot.find_node(id).ok().flatten();
     let name = node.and_then(|node| node.name().ok());
     name.unwrap_or_else(|| NodeRef::Id(id).to_string())

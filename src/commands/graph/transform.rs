@@ -1,6 +1,6 @@
 //! `cortex graph transform`.
 
-use super::source::{Source, find_node};
+use super::source::{Source, find_node, is_recording};
 use crate::cli::GraphSource;
 use crate::commands::output::{print, print_json, tell, value_text};
 use crate::{Answer, Failure};
@@ -11,9 +11,21 @@ pub(super) fn transform(
     graph: &GraphSource,
     target: &str,
     source: &str,
-    at: Option<f64>,
 ) -> Result<Answer, Failure> {
-    let snapshot = Source::open(graph)?.snapshot()?;
+    // A recording is opened as of then.
+    let (at, graph) = if is_recording(graph) {
+        (None, graph.clone())
+    } else {
+        let at = None;
+        (
+            graph.at,
+            GraphSource {
+                at,
+                ..graph.clone()
+            },
+        )
+    };
+    let snapshot = Source::open(&graph)?.snapshot()?;
     let ids = (find_node(&snapshot, target)?, find_node(&snapshot, source)?);
     // Before 0 counts back from the newest version.
     let time = at.map(|at| match at {
