@@ -206,7 +206,7 @@ fn pages_of_hot_attributes() {
     let mut page = vec![0u64; 30];
     page[0] = 1;
     page[14..23].copy_from_slice(&[2, 5, 0, 1, 3, 6 | 1 << 32, 0, 9, 0.5f64.to_bits()]);
-    let whole = [&[u64::from_le_bytes(*b"cortexH1"), 1], &page[..]].concat();
+    let whole = [&[u64::from_le_bytes(*b"cortexH2"), 1], &page[..]].concat();
     let whole: Vec<u64> = whole.into_iter().chain([0; 2048]).collect();
     let (epoch, node, name) = (dsr::Epoch(3), dsr::NodeId(5), dsr::AttributeId(1));
     let value = dsr::wire::read_hot_page(&whole, epoch, node, name);
