@@ -15,7 +15,7 @@ pub use scan::{NodeIds, TypedEdges, TypedIds};
 
 use crate::arena::record;
 use crate::arena::tree::{self, Key};
-use crate::arena::{Address, Arena, LeaseMark, ReadError, Root, Word, cells, trie};
+use crate::arena::{Address, Arena, LeaseMark, ReadError, Root, Word, cells, late};
 use crate::hot::Hot;
 use crate::shm::Segment;
 use crate::value::{hash, place};
@@ -232,7 +232,7 @@ impl Snapshot {
 
     #[inline(never)]
     fn record_in_trie(&self, id: NodeId) -> Result<Option<(Address, &[Word])>, Address> {
-        let found = trie::find(&self.arena, self.root.nodes, id.0)?;
+        let found = late::find(&self.arena, &self.root, id.0)?;
         Ok(found.map(|address| (address, self.arena.from(address).unwrap_or(&[]))))
     }
 
@@ -286,7 +286,7 @@ impl Snapshot {
 
     /// All nodes, in an order that depends on their ids alone.
     pub fn nodes(&self) -> impl Iterator<Item = Result<Node<'_>, ReadError>> {
-        let mut walk = Some(trie::Walk::new(self.root.nodes));
+        let mut walk = Some(late::Walk::new(self.root));
         std::iter::from_fn(move || {
             let next = walk.as_mut()?.next(&self.arena);
             let node = |(address, words)| self.node_at(address, words);

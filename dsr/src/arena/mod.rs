@@ -13,6 +13,7 @@ pub(crate) mod allocator;
 pub(crate) mod cells;
 #[cfg(test)]
 pub(crate) mod journal;
+pub(crate) mod late;
 pub(crate) mod protocol;
 pub(crate) mod record;
 mod root;
@@ -80,7 +81,7 @@ pub enum ReadError {
 }
 
 pub(crate) const MAGIC: u64 = u64::from_le_bytes(*b"cortexG1");
-pub(crate) const FORMAT: u64 = 7;
+pub(crate) const FORMAT: u64 = 8;
 
 /// Header words of segment 0.
 mod at {

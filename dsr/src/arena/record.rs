@@ -124,15 +124,22 @@ pub(crate) struct NodeInPlace {
 }
 
 impl NodeInPlace {
-    /// The node at the beginning of `words`, and where in them its small attribute of that name lies.
-    pub(crate) fn with_small(words: &[Word], name: u16) -> Option<(Self, std::ops::Range<usize>)> {
-        let (header, table) = words.split_first_chunk::<NODE_HEADER>()?;
+    /// The node at the beginning of `words`.
+    pub(crate) fn at(words: &[Word]) -> Option<Self> {
+        let header = words.first_chunk::<NODE_HEADER>()?;
         let kind = header[1].load();
-        let node = Self {
+        Some(Self {
             id: header[0].load(),
             type_id: kind as u16,
             len: NODE_HEADER + (kind >> 32) as usize,
-        };
+        })
+    }
+
+    /// The node at the beginning of `words`, and where in them its small attribute of that name lies.
+    pub(crate) fn with_small(words: &[Word], name: u16) -> Option<(Self, std::ops::Range<usize>)> {
+        let node = Self::at(words)?;
+        let (header, table) = words.split_first_chunk::<NODE_HEADER>()?;
+        let kind = header[1].load();
         let small = table::small_of(table, kind, name)?;
         Some((node, NODE_HEADER + small.start..NODE_HEADER + small.end))
     }

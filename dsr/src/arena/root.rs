@@ -90,6 +90,13 @@ root! {
         /// The row of cells, and how many they are.
         cells: Address,
         cell_count: u64,
+        /// The record of a node which the trie has elsewhere, see the file `late`; 0 for none.
+        late_node: Address,
+        /// A client whose last transaction the tree of answers does not have, and that; 0 for none.
+        late_client: u64,
+        late_answer: Address,
+        /// Fills the root's last cache line.
+        reserved: u64,
     }
 }
 

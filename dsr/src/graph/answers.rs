@@ -84,10 +84,20 @@ impl Answered {
 impl Snapshot {
     /// The last transaction of a client.
     pub(crate) fn answered(&self, client: u64) -> Result<Option<Answered>, ReadError> {
-        let found = tree::find(&self.arena, self.root.answers, [client, 0]);
+        let late = self.late_answer().filter(|(of, _)| *of == client);
+        let found = match late {
+            Some((_, address)) => Ok(Some(address)),
+            None => tree::find(&self.arena, self.root.answers, [client, 0]),
+        };
         self.genuine(found)?
             .map(|address| self.genuine(Answered::read(&self.arena, client, address)))
             .transpose()
+    }
+
+    /// The client of which the tree has an older transaction than its last, and where that is.
+    fn late_answer(&self) -> Option<(u64, Address)> {
+        let (client, answer) = (self.root.late_client, self.root.late_answer);
+        (answer != 0).then_some((client, answer))
     }
 
     /// The last transaction of every client, by client.
@@ -95,7 +105,9 @@ impl Snapshot {
         let range = tree::Range::new(&self.arena, self.root.answers, [0, 0], [u64::MAX; 2]);
         let mut range = self.genuine(range)?;
         let mut all = Vec::new();
-        while let Some(([client, _], address)) = self.genuine(range.next())? {
+        while let Some(([client, _], found)) = self.genuine(range.next())? {
+            let late = self.late_answer().filter(|(of, _)| *of == client);
+            let address = late.map_or(found, |(_, address)| address);
             all.push(self.genuine(Answered::read(&self.arena, client, address))?);
             if all.len() > CLIENTS {
                 return Err(ReadError::Damaged {
@@ -127,6 +139,24 @@ impl Work<'_> {
             .writer
             .put(None, |words| encode(id, commit, words));
         let address = self.room(put)?;
+        // What the tree has of the client is found again, and given up, in the next commit.
+        if self.root.late_answer == 0 && self.graph.clients.contains_key(&client) {
+            (self.root.late_client, self.root.late_answer) = (client, address);
+            return Ok(());
+        }
+        self.enter_answer(client, address)
+    }
+
+    /// Enters into the tree the answer that only the root leads to.
+    pub(super) fn enter_late_answer(&mut self) -> Result<(), Refusal> {
+        let client = std::mem::take(&mut self.root.late_client);
+        match std::mem::take(&mut self.root.late_answer) {
+            0 => Ok(()),
+            answer => self.enter_answer(client, answer),
+        }
+    }
+
+    fn enter_answer(&mut self, client: u64, address: Address) -> Result<(), Refusal> {
         let (root, key) = (self.root.answers, [client, 0]);
         let set = tree::set(&mut self.graph.writer, root, key, address);
         self.root.answers = if let Some((answers, last)) = self.room(set)? {
@@ -199,6 +229,9 @@ mod tests {
         let last = commit(&mut restored, id(5, 2), &Transaction::new());
         assert_eq!(restored.answered(5).unwrap().unwrap().commit, last);
         assert!(restored.answered(4).unwrap().is_none());
+        let all = restored.snapshot().all_answered().unwrap();
+        assert_eq!(all.len(), 2);
+        assert_eq!(all[0].commit, last, "also before the tree has it");
     }
 
     #[test]

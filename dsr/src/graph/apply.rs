@@ -31,7 +31,7 @@ impl From<SchemaError> for Refusal {
 }
 
 /// What a written attribute remembers.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Stamp {
     /// Of the node or edge.
     record: u64,
@@ -63,13 +63,13 @@ impl<'a> Work<'a> {
             Some(rights) if agent != STORE => Some(rights.of(agent)?),
             _ => None,
         };
-        let mut root = graph.root;
-        root.version += 1;
-        root.time = time.nanoseconds();
+        let mut work = Self::begin(graph)?;
+        work.rights = rights;
+        work.root.time = time.nanoseconds();
+        let Self { graph, root, .. } = &mut work;
         graph.effects.clear();
-        let writer = graph
-            .writer_id(agent, &mut root)
-            .map_err(|Full| graph.full())?;
+        let writer = graph.writer_id(agent, root);
+        let writer = writer.map_err(|Full| graph.full())?;
         root.agent = u64::from(writer) + 1;
         let rules = std::mem::take(&mut root.rules);
         if rules != 0 {
@@ -77,21 +77,42 @@ impl<'a> Work<'a> {
             let words = record::blob_len(&graph.writer.arena, rules);
             graph.writer.retire(rules, words);
         }
-        Ok(Self {
+        work.stamp = Stamp {
+            record: root.version,
+            version: root.version,
+            time: root.time,
+            writer,
+        };
+        Ok(work)
+    }
+
+    /// A commit after the newest version, in which trees have what there only the root leads to.
+    #[inline]
+    fn begin(graph: &'a mut Graph) -> Result<Self, Refusal> {
+        let root = graph.prepared.take().unwrap_or(Root {
+            version: graph.root.version + 1,
+            ..graph.root
+        });
+        let mut work = Self {
             graph,
             root,
             forgotten: None,
-            stamp: Stamp {
-                record: root.version,
-                version: root.version,
-                time: root.time,
-                writer,
-            },
+            stamp: Stamp::default(),
             schema_changed: false,
             created: Vec::new(),
-            rights,
+            rights: None,
             by_rule: false,
-        })
+        };
+        work.enter_late_node()?;
+        work.enter_late_answer()?;
+        Ok(work)
+    }
+
+    /// Does of the next commit what does not depend on what it will be.
+    pub(super) fn prepare(graph: &'a mut Graph) -> Result<(), Refusal> {
+        let Self { graph, root, .. } = Self::begin(graph)?;
+        graph.prepared = Some(root);
+        Ok(())
     }
 
     /// The root of a graph that is what the image says.

@@ -111,6 +111,8 @@ impl Default for Limits {
 pub struct Graph {
     writer: Writer,
     root: Root,
+    /// What the next version begins with, where that was written already.
+    prepared: Option<Root>,
     schema: Arc<Schema>,
     writers: Arc<Vec<String>>,
     epoch: Epoch,
@@ -156,6 +158,7 @@ impl Graph {
                 lineage: epoch.0,
                 ..Root::default()
             },
+            prepared: None,
             schema: Arc::new(schema),
             writers: Arc::default(),
             epoch,
@@ -329,6 +332,10 @@ impl Graph {
             self.reclaim(self.limits.history_bytes);
             self.writer.allocator.prepare(&self.writer.arena);
             self.writer.arena.prepare_root(self.root.version + 1);
+            if Work::prepare(self).is_err() {
+                // The next commit will say so, if it still is.
+                self.abandon_blocks();
+            }
         }
     }
 
@@ -378,9 +385,15 @@ impl Graph {
     }
 
     fn abandon(&mut self, before: &(Arc<Schema>, Arc<Vec<String>>)) {
-        self.writer.abandon();
+        self.abandon_blocks();
         self.schema = Arc::clone(&before.0);
         self.writers = Arc::clone(&before.1);
+    }
+
+    fn abandon_blocks(&mut self) {
+        self.writer.abandon();
+        self.prepared = None;
+        self.is_settled = false;
     }
 
     fn publish(&mut self, root: &Root) {

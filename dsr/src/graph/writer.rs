@@ -104,10 +104,25 @@ impl Writer {
         Ok(own)
     }
 
+    /// Whether nobody else can see the block yet.
+    pub(crate) fn is_own(&self, address: Address) -> bool {
+        self.allocator.is_fresh(address)
+    }
+
     /// A block like the one of `len` words at `address`, in its place, that may be written over: itself where
     /// nobody else can see it yet.
-    pub(crate) fn own(&mut self, address: Address, len: usize) -> Result<Address, Full> {
-        if self.allocator.is_fresh(address) {
+    fn own(&mut self, address: Address, len: usize) -> Result<Address, Full> {
+        let own = self.copy(address, len)?;
+        if own != address {
+            self.retire(address, len);
+        }
+        Ok(own)
+    }
+
+    /// A block like the one of `len` words at `address` that may be written over: itself where nobody else can
+    /// see it yet, else beside it.
+    pub(crate) fn copy(&mut self, address: Address, len: usize) -> Result<Address, Full> {
+        if self.is_own(address) {
             return Ok(address);
         }
         let new = self.allocator.allocate(&self.arena, len)?;
@@ -117,7 +132,6 @@ impl Writer {
                 to.store(from.load());
             }
         }
-        self.retire(address, len);
         Ok(new)
     }
 

@@ -177,7 +177,7 @@ impl Work<'_> {
         let head = (stamp.version, stamp.time, stamp.writer);
         AttributeRecord::encode(&mut words, value, head, None);
         let fits = words.len() == at.len();
-        let own = fits.then(|| writer.own(address, node.len)).transpose();
+        let own = fits.then(|| writer.copy(address, node.len)).transpose();
         if let Ok(Some(own)) = own {
             writer.overwrite(own, VERSION, &[stamp.record]);
             writer.overwrite(own, SINCE, &[since]);
@@ -187,7 +187,9 @@ impl Work<'_> {
         let Some(own) = self.room(own)? else {
             return Ok(false);
         };
-        self.lead(id.0, address, own)?;
+        if own != address {
+            self.lead_late(id.0, own)?;
+        }
         let nodes = &mut self.graph.effects.nodes;
         nodes.touch(id, type_id, Touch::Updated, Some(name));
         Ok(true)

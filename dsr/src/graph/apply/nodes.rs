@@ -2,9 +2,9 @@
 //! and the edges that touch it never disagree.
 
 use super::{Work, damaged, read};
-use crate::arena::record::{self, NodeRecord};
+use crate::arena::record::{self, NodeInPlace, NodeRecord};
 use crate::arena::table::Table;
-use crate::arena::{Address, cells, tree, trie};
+use crate::arena::{Address, Word, cells, late, tree, trie};
 use crate::graph::Writer;
 use crate::rights::Carrier;
 use crate::value::hash;
@@ -14,7 +14,7 @@ impl Work<'_> {
     pub(super) fn find(&self, node: &NodeRef) -> Result<Option<NodeId>, Refusal> {
         match node {
             NodeRef::Id(id) => {
-                let found = trie::find(&self.graph.writer.arena, self.root.nodes, id.0);
+                let found = late::find(&self.graph.writer.arena, &self.root, id.0);
                 Ok(read(found)?.map(|_| *id))
             }
             NodeRef::Name(name) => {
@@ -46,7 +46,7 @@ impl Work<'_> {
         {
             return Ok(address);
         }
-        read(trie::find(arena, self.root.nodes, id.0))?
+        read(late::find(arena, &self.root, id.0))?
             .ok_or_else(|| Refusal::NotFound(node.to_string()))
     }
 
@@ -55,22 +55,56 @@ impl Work<'_> {
         old: Option<(Address, usize)>,
         node: &NodeRecord,
     ) -> Result<(), Refusal> {
-        let since = self.root.version;
-        let put = self
-            .graph
-            .writer
-            .put(old, |words| node.encode(since, words));
-        let address = self.room(put)?;
-        self.lead(node.id, old.map_or(0, |(address, _)| address), address)
+        let (since, writer) = (self.root.version, &mut self.graph.writer);
+        // The trie leads there until the next commit.
+        let seen = old.is_some_and(|(address, _)| !writer.is_own(address));
+        let in_place_of = old.filter(|_| !seen);
+        let put = writer.put(in_place_of, |words| node.encode(since, words));
+        let new = self.room(put)?;
+        match old {
+            Some((old, _)) if old == new => Ok(()),
+            Some((old, _)) if seen || old == self.root.late_node => self.lead_late(node.id, new),
+            _ => {
+                self.graph.writer.moved.push((node.id, new));
+                self.enter(node.id, new)
+            }
+        }
     }
 
-    /// Leads to a node's record at `new` what led to the one at `old`, if there was one.
-    pub(super) fn lead(&mut self, id: u64, old: Address, new: Address) -> Result<(), Refusal> {
-        let writer = &mut self.graph.writer;
-        if old != new {
-            writer.moved.push((id, new));
+    /// Leads to the record at `new` of a node that was there before this commit: the cell does and the root,
+    /// and the trie in the next commit. Of several such nodes all but the last are entered now.
+    pub(super) fn lead_late(&mut self, id: u64, new: Address) -> Result<(), Refusal> {
+        self.graph.writer.moved.push((id, new));
+        if self.late_id() != Some(id) {
+            self.enter_late_node()?;
         }
-        let nodes = trie::insert(writer, self.root.nodes, id, new);
+        self.root.late_node = new;
+        Ok(())
+    }
+
+    fn late_id(&self) -> Option<u64> {
+        let late = (self.root.late_node != 0).then_some(self.root.late_node)?;
+        let record = self.graph.writer.arena.from(late)?;
+        record.first().map(Word::load)
+    }
+
+    /// Enters into the trie the node that only the root leads to, and retires the record that the trie
+    /// led to.
+    pub(super) fn enter_late_node(&mut self) -> Result<(), Refusal> {
+        let (Some(id), late) = (self.late_id(), self.root.late_node) else {
+            return Ok(());
+        };
+        self.root.late_node = 0;
+        let writer = &mut self.graph.writer;
+        if let Some(old) = read(trie::find(&writer.arena, self.root.nodes, id))? {
+            let record = writer.arena.from(old).and_then(NodeInPlace::at);
+            writer.retire(old, record.map_or(0, |record| record.len));
+        }
+        self.enter(id, late)
+    }
+
+    fn enter(&mut self, id: u64, record: Address) -> Result<(), Refusal> {
+        let nodes = trie::insert(&mut self.graph.writer, self.root.nodes, id, record);
         self.root.nodes = self.room(nodes)?;
         Ok(())
     }
@@ -192,6 +226,9 @@ impl Work<'_> {
         }
         for address in node.table.blocks() {
             self.retire_attribute(address);
+        }
+        if self.root.late_node == address {
+            self.enter_late_node()?;
         }
         let name = read(record::read_blob(&self.graph.writer.arena, node.name))?;
         let hash = hash(&String::from_utf8_lossy(&name));

@@ -2,14 +2,14 @@
 
 use super::*;
 use crate::NodeRef;
-use crate::arena::{Address, cells, trie};
+use crate::arena::{Address, cells, late};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// The addresses of a node's record by the short way and by the trie.
 fn ways(snapshot: &Snapshot, id: u64) -> Result<[Option<Address>; 2], ReadError> {
     let short = cells::find(&snapshot.arena, &snapshot.root, id);
-    let long = snapshot.genuine(trie::find(&snapshot.arena, snapshot.root.nodes, id))?;
+    let long = snapshot.genuine(late::find(&snapshot.arena, &snapshot.root, id))?;
     snapshot.check()?;
     Ok([short.map(|(address, _)| address), long])
 }
