@@ -9,6 +9,7 @@
 mod config;
 mod graph;
 mod identity;
+mod nearest;
 mod relations;
 mod scene;
 mod track;
@@ -16,8 +17,8 @@ mod track;
 #[cfg(test)]
 mod tests;
 
-pub use config::{Config, Thresholds, Tracking};
-pub use graph::{HumanObserver, people, person_id, person_name, surroundings};
+pub use config::{Association, Config, Nearest, Thresholds, Tracking};
+pub use graph::{HumanObserver, SETTINGS, people, person_id, person_name, surroundings};
 pub use scene::{Object, Scene, Shape, Surroundings, TrackedPerson};
 
 use crate::messages::CameraFrame;
@@ -107,8 +108,8 @@ impl Observer {
                 self.take_in(frame, &surroundings.plan);
             }
         }
+        self.bury(now);
         let config = &self.config;
-        self.tracks.retain(|track| !track.is_dead(now, config));
         let mut people: Vec<TrackedPerson> = self
             .tracks
             .iter()
@@ -143,26 +144,39 @@ impl Observer {
 
     fn take_in(&mut self, frame: &CameraFrame, plan: &FloorPlan) {
         self.frame += 1;
-        self.cameras.insert(frame.camera.clone(), frame.time);
+        let before = self.cameras.insert(frame.camera.clone(), frame.time);
+        let since = before.map_or(0.0, |before| frame.time.since(before));
         self.clock = Some(self.clock.map_or(frame.time, |clock| clock.max(frame.time)));
         let sightings = self.sightings(frame);
         for track in &mut self.tracks {
             track.predict(frame.time, &self.config);
         }
+        if self.config.association == Association::Nearest {
+            self.take_nearest(&sightings);
+            self.bury(frame.time);
+            return;
+        }
         let mut free: Vec<usize> = (0..sightings.len()).collect();
         for confirmed in [true, false] {
             self.associate(frame.time, &sightings, &mut free, confirmed);
         }
-        self.count_misses(frame, &sightings, plan);
+        self.count_misses(frame, since, &sightings, plan);
         let newborn = free
             .iter()
             .map(|&index| Track::new(sightings[index], self.frame, &self.config));
         self.tracks.extend(newborn);
         self.confirm(plan);
-        let clock = frame.time;
+        self.bury(frame.time);
+        self.merge(frame.time);
+    }
+
+    /// Forgets those for whom the evidence has run out at `now`.
+    fn bury(&mut self, now: Time) {
         let config = &self.config;
-        self.tracks.retain(|track| !track.is_dead(clock, config));
-        self.merge(clock);
+        self.tracks.retain(|track| !match config.association {
+            Association::Evidence => track.is_dead(now, config),
+            Association::Nearest => nearest::is_dead(track, now, &config.nearest),
+        });
     }
 
     /// The frame's usable detections in the world frame, in order of x.
@@ -203,13 +217,7 @@ impl Observer {
         confirmed: bool,
     ) {
         let config = &self.config;
-        // Twice the logarithm of how much likelier a person in view is detected than that a false
-        // detection lies there: costs beyond it are better explained by chance.
-        let chance = config.detection_probability
-            / ((1.0 - config.detection_probability)
-                * std::f64::consts::TAU
-                * config.clutter_density);
-        let greatest_cost = 2.0 * chance.ln();
+        let greatest_cost = config.greatest_cost();
         let mut pairs = Vec::new();
         for (row, track) in self.tracks.iter().enumerate() {
             if track.id.is_some() != confirmed || track.is_lost(frame_time, config) {
@@ -250,7 +258,14 @@ impl Observer {
 
     /// Holds it against those the camera had to see and did not. Hidden behind a body is not had to:
     /// one that this frame shows, or one that it missed as well.
-    fn count_misses(&mut self, frame: &CameraFrame, sightings: &[Sighting], plan: &FloorPlan) {
+    /// `since` is the time from the camera's frame before, s.
+    fn count_misses(
+        &mut self,
+        frame: &CameraFrame,
+        since: f64,
+        sightings: &[Sighting],
+        plan: &FloorPlan,
+    ) {
         let camera = Point2::from(frame.world_from_camera.translation.vector);
         let config = &self.config;
         let bodies: Vec<Point2<f64>> = sightings
@@ -273,7 +288,7 @@ impl Observer {
                     .iter()
                     .any(|&body| hides(camera, body, place, config.body_radius));
             if visible {
-                track.missed(frame.time, config);
+                track.missed(frame.time, since, config);
             }
         }
     }

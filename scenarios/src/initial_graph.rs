@@ -2,6 +2,7 @@
 //! Objects and people are not in it; the agents must perceive them.
 
 use crate::scenario::{Activity, Door, Scenario};
+use agents::human_observer::SETTINGS as OBSERVER_SETTINGS;
 use agents::social_mapping::graph::SETTINGS;
 use dsr::{EdgeRef, Operation, Schema, SchemaFileError, Transaction, Value};
 use nalgebra::{Isometry2, Point2};
@@ -35,6 +36,9 @@ pub fn initial_graph(scenario: &Scenario) -> Transaction {
     // Figures that JSON cannot have are in no scenario.
     if let Ok(settings) = serde_json::to_string(&scenario.social) {
         world.push(attribute(SETTINGS, settings.as_str()));
+    }
+    if let Ok(settings) = serde_json::to_string(&scenario.human_observer) {
+        world.push(attribute(OBSERVER_SETTINGS, settings.as_str()));
     }
     graph.create_node("world", WORLD, world);
     for room in &scenario.rooms {

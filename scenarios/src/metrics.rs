@@ -10,12 +10,14 @@ mod object_space;
 mod shortest;
 #[cfg(test)]
 mod tests;
+mod tracking;
 
 pub use company::{COMPLIANT, Company, FORESIGHT, HALL, PsiDistance};
 pub use motion::{Motion, TURNING};
 pub(crate) use object_space::mapped;
 pub use object_space::{ObjectSpace, SpacesError, object_spaces};
 pub use shortest::{shortest_way, spl};
+pub use tracking::{NEAR_ENOUGH, TrackingFigures, TrackingScore};
 
 use crate::world::{Collisions, Truth, wrap};
 use agents::social_mapping::{Zone, zone_at};

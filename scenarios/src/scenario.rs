@@ -23,6 +23,7 @@ pub use schedule::parse_schedule;
 #[cfg(test)]
 pub(crate) use space::CLASSES;
 
+use agents::human_observer;
 use agents::social_mapping::SocialConfig;
 use dsr::Time;
 use nalgebra::{Isometry2, Point2, Vector2};
@@ -73,6 +74,8 @@ pub struct Scenario {
     pub tracks: TracksFrame,
     /// The figures of social mapping.
     pub social: SocialConfig,
+    /// The figures of the human observer.
+    pub human_observer: human_observer::Config,
 }
 
 /// A room.

@@ -159,6 +159,26 @@ impl Tracks {
         self
     }
 
+    /// xmin, ymin, xmax, ymax of everywhere that somebody was observed.
+    pub fn extent(&self) -> [f64; 4] {
+        let samples = self.people.iter().flat_map(|track| &track.samples);
+        let none = [
+            f64::INFINITY,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            f64::NEG_INFINITY,
+        ];
+        samples.fold(none, |[left, bottom, right, top], sample| {
+            let at = sample.position;
+            [
+                left.min(at.x),
+                bottom.min(at.y),
+                right.max(at.x),
+                top.max(at.y),
+            ]
+        })
+    }
+
     /// When the last person leaves, in seconds after the run begins.
     pub fn duration(&self) -> f64 {
         let ends = self.people.iter().filter_map(|track| track.samples.last());

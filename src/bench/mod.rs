@@ -1,7 +1,7 @@
 //! Measuring what Cortex is made of: the shared graph beside raw iceoryx2 and a copy on the heap, the
 //! planner from text to plan, rules beside other matchers, social maps beside numpy, path search beside
-//! others. It guarantees that a figure and the one it is compared with come from the same run, taken in
-//! turns where both are short.
+//! others, tracking beside the time of a frame. It guarantees that a figure and the one it is compared
+//! with come from the same run, taken in turns where both are short.
 //!
 //! Who measures the graph starts a store and peers by executing the program again, in an instance of
 //! its own, and ends and removes all of them.
@@ -19,6 +19,7 @@ mod hall;
 mod indoor;
 mod path;
 mod peer;
+mod perception;
 mod plan;
 mod quantity;
 mod reads;
@@ -32,6 +33,7 @@ pub(crate) use chance::Chance;
 pub(crate) use figure::{Figure, table};
 pub(crate) use path::paths;
 pub(crate) use peer::play;
+pub(crate) use perception::perception;
 pub(crate) use plan::plans;
 pub(crate) use quantity::{Quantity, table as quantities_table};
 pub(crate) use rules::rules;

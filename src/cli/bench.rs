@@ -34,6 +34,9 @@ pub(crate) enum BenchAction {
     /// Social maps: people's density, updates, crowds, outlines
     #[command(after_help = "Takes a few seconds.\n\nExample:\n  cortex bench social --json")]
     Social,
+    /// The human observer among a thousand people
+    #[command(after_help = "Takes a few seconds.\n\nExample:\n  cortex bench perception")]
+    Perception,
     /// The planner: from the text of rules, world and goal to the plan
     #[command(after_help = "Takes a few seconds.\n\nExample:\n  cortex bench plan --tasks tasks")]
     Plan {

@@ -14,6 +14,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
         })?,
         BenchAction::Rules => return tell(&bench::rules()?, arguments.json),
         BenchAction::Social => return tell(&bench::social()?, arguments.json),
+        BenchAction::Perception => return tell(&bench::perception()?, arguments.json),
         BenchAction::Plan { tasks } => bench::plans(tasks.as_deref())?,
         BenchAction::Path => bench::paths()?,
     };

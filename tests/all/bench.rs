@@ -87,3 +87,14 @@ fn the_figures_of_social_maps_are_all_there_each_beside_something() {
         assert!(!row["beside"].as_str().unwrap().is_empty(), "{row}");
     }
 }
+
+#[test]
+fn a_thousand_people_are_tracked_beside_the_time_of_a_frame() {
+    let output = Program::run(&["bench", "perception", "--json"]);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    let rows: Vec<Value> = serde_json::from_slice(&output.stdout).unwrap();
+    let names: Vec<&str> = rows.iter().map(|f| f["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["track_1000", "track_1000_p99"]);
+    assert!(rows.iter().all(|row| row["value"].as_f64().unwrap() > 0.0));
+}

@@ -352,6 +352,14 @@ fn what_cannot_be_used_is_refused_with_what_could() {
         ),
         (&["social", "comfort", &file, "--folds", "1"], "2.."),
         (&["experiment", "fd-tabel1"], "did you mean `fd-table1`?"),
+        (
+            &["experiment", "fd-table1", "--tracks", &file],
+            "`--tracks` is for `perception`",
+        ),
+        (
+            &["experiment", "perception", "--tracks", "nowhere.txt"],
+            "cannot read nowhere.txt",
+        ),
     ] {
         let (code, _, err) = cortex(arguments);
         assert_eq!(code, 2, "{arguments:?}: {err}");
@@ -386,4 +394,37 @@ fn every_experiment_listed_runs() {
     let (code, out, _) = cortex(&["experiment", "fd-table1"]);
     assert_eq!(code, 0);
     assert!(out.contains("READING.md 3"), "{out}");
+}
+
+/// Two people who pass each other, 3 m apart, in 20 s.
+fn two_who_pass() -> String {
+    let line = |frame: u32| {
+        let x = f64::from(frame) * 0.04;
+        let back = 20.0 - x;
+        format!("{frame} 1 {x:.3} 0.0\n{frame} 2 {back:.3} 3.0\n")
+    };
+    (0..=500).step_by(10).map(line).collect()
+}
+
+#[test]
+fn perception_is_held_against_recorded_and_simulated_people() {
+    let folder = tempfile::tempdir().unwrap();
+    let tracks = save(&folder, "tracks.txt", &two_who_pass());
+    for more in [&["--tracks", tracks.as_str()][..], &[]] {
+        let arguments = ["experiment", "perception", "--seeds", "1", "--json"];
+        let (code, out, err) = cortex(&[&arguments, more].concat());
+        assert_eq!(code, 0, "{err}");
+        let table: Value = serde_json::from_str(&out).unwrap();
+        let figure = |name: &str| table[name].as_f64().unwrap();
+        assert!(figure("mota") > 0.9 && figure("idf1") > 0.85, "{table}");
+        assert!(figure("position_rmse") < 0.1, "{table}");
+        assert!(figure("heading_error") < 0.1, "{table}");
+        assert!(figure("latency_p99") > 0.0, "{table}");
+        let sort = table["rows"][1]["values"]["mota"].as_f64().unwrap();
+        assert!(figure("mota") >= sort, "{table}");
+        assert_eq!(
+            table["rows"][0]["values"]["id_switches"],
+            table["id_switches"]
+        );
+    }
 }

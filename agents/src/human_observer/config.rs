@@ -12,10 +12,88 @@ pub struct Config {
     pub relations: Thresholds,
 }
 
+impl Config {
+    /// What the observer could not work with, in words; `None` where all is well.
+    pub fn problem(&self) -> Option<&'static str> {
+        let Tracking {
+            position_noise,
+            heading_noise,
+            speed_spread,
+            detection_probability,
+            clutter_density,
+            velocity_decay,
+            greatest_spread,
+            confirmation_looks,
+            ..
+        } = self.tracking;
+        let positive = [
+            position_noise,
+            heading_noise,
+            speed_spread,
+            clutter_density,
+            velocity_decay,
+            greatest_spread,
+        ];
+        if !positive
+            .iter()
+            .all(|figure| figure.is_finite() && *figure > 0.0)
+        {
+            Some("noises, spreads, the decay and the clutter must be finite and greater than 0")
+        } else if !(detection_probability > 0.0 && detection_probability < 1.0) {
+            Some("the detection probability must be greater than 0 and less than 1")
+        } else if !(1..=32).contains(&confirmation_looks) {
+            Some("the looks considered for confirmation must be from 1 to 32")
+        } else {
+            None
+        }
+    }
+}
+
+/// How detections are given to people, and how long those are kept.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Association {
+    /// The likeliest assignment of a whole frame, birth and death by evidence for and against, and
+    /// identities handed on when somebody is lost and found.
+    #[default]
+    Evidence,
+    /// As SORT does it (Bewley et al., ICIP 2016), with distances on the floor in place of
+    /// overlapping boxes: the nearest detection to each prediction, a person after some hits, gone
+    /// when unseen for a while. What [`Association::Evidence`] is measured against.
+    Nearest,
+}
+
+/// The figures of [`Association::Nearest`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Nearest {
+    /// A detection further from the prediction than this is of somebody else, m.
+    pub gate: f64,
+    /// Hits that make a person of a track.
+    pub hits: u32,
+    /// Who is unseen for so long is gone, s.
+    pub greatest_age: f64,
+}
+
+impl Default for Nearest {
+    fn default() -> Self {
+        Self {
+            gate: 0.6,
+            hits: 3,
+            greatest_age: 0.3,
+        }
+    }
+}
+
 /// Motion model, association, birth and death.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Tracking {
+    /// How detections are given to people.
+    pub association: Association,
+    /// For [`Association::Nearest`]; of the other figures it uses those of the motion model, the
+    /// score and the delay.
+    pub nearest: Nearest,
     /// Standard deviation of a detected position along each axis, m.
     pub position_noise: f64,
     /// Standard deviation of a detected heading, rad.
@@ -45,8 +123,9 @@ pub struct Tracking {
     pub confirmation_looks: u32,
     /// A track not yet confirmed dies when unseen for so long, s.
     pub tentative_time: f64,
-    /// A person is gone when cameras looked at the place and saw nobody for so long, s: seven frames
-    /// in a row at 10 frames a second, which 10 % of misses bring about once in ten million.
+    /// A person is gone when cameras looked at the place and saw nobody for so long, s, summed over
+    /// the cameras: seven frames in a row at 10 frames a second, which 10 % of misses bring about once
+    /// in ten million.
     pub lost_in_view: f64,
     /// Somebody gone is remembered for so long since last seen, s, and found again under the same
     /// number.
@@ -73,7 +152,7 @@ pub struct Tracking {
     pub merge_time: f64,
     /// A newcomer takes the identity of somebody lost if reachable: so far at once, m ...
     pub handover_distance: f64,
-    /// ... and so much more for every second since, m/s ...
+    /// ... and so much more for every second since in which no camera looked, m/s ...
     pub handover_speed: f64,
     /// ... up to so far, m.
     pub handover_limit: f64,
@@ -81,9 +160,20 @@ pub struct Tracking {
     pub greatest_delay: f64,
 }
 
+impl Tracking {
+    /// Twice the logarithm of how much likelier a person in view is detected than that a false
+    /// detection lies there: costs beyond it are better explained by chance.
+    pub(super) fn greatest_cost(&self) -> f64 {
+        let missed = (1.0 - self.detection_probability) * std::f64::consts::TAU;
+        2.0 * (self.detection_probability / (missed * self.clutter_density)).ln()
+    }
+}
+
 impl Default for Tracking {
     fn default() -> Self {
         Self {
+            association: Association::default(),
+            nearest: Nearest::default(),
             position_noise: 0.1,
             heading_noise: 0.15,
             acceleration_density: 0.5,
@@ -94,7 +184,7 @@ impl Default for Tracking {
             gate: 13.8,
             detection_probability: 0.9,
             clutter_density: 0.002,
-            confirmation_hits: 4,
+            confirmation_hits: 3,
             confirmation_looks: 6,
             tentative_time: 1.0,
             lost_in_view: 0.7,
@@ -108,7 +198,7 @@ impl Default for Tracking {
             body_radius: 0.25,
             merge_distance: 0.35,
             merge_time: 0.6,
-            handover_distance: 0.5,
+            handover_distance: 0.6,
             handover_speed: 1.0,
             handover_limit: 3.0,
             greatest_delay: 0.5,

@@ -25,6 +25,10 @@ const COVARIANCE_STEP: f64 = 0.25;
 
 type PersonNodes<'a> = (BTreeMap<u64, Node<'a>>, BTreeSet<String>);
 
+/// The world's attribute that holds the observer's figures, as JSON: those of [`Config`] that differ
+/// from the default.
+pub const SETTINGS: &str = "observer_settings";
+
 /// The human observer as an agent: frames and a snapshot in, a transaction out.
 #[derive(Debug)]
 pub struct HumanObserver {
@@ -35,6 +39,25 @@ pub struct HumanObserver {
     adopted: bool,
     /// Since when the graph says that somebody is in front of the robot.
     fronts: BTreeMap<u64, Time>,
+}
+
+/// The figures that the world's node has; none where it has none, or some that cannot be read.
+fn settings(snapshot: &Snapshot) -> Result<Option<Config>, ReadError> {
+    let Some(world) = first_of_type(snapshot, "world")? else {
+        return Ok(None);
+    };
+    let value = world.value(SETTINGS)?;
+    let Some(text) = value.as_ref().and_then(Value::as_str) else {
+        return Ok(None);
+    };
+    let read = serde_json::from_str::<Config>(text).map_err(|error| error.to_string());
+    let usable = read.and_then(|config| match config.problem() {
+        None => Ok(config),
+        Some(problem) => Err(problem.to_owned()),
+    });
+    Ok(usable
+        .inspect_err(|problem| tracing::warn!("the world's {SETTINGS} are left out: {problem}"))
+        .ok())
 }
 
 /// Rooms, walls, the robot and the objects of the graph. Objects that are nowhere are left out.
@@ -164,7 +187,8 @@ impl HumanObserver {
 
     /// Takes in `frames` and says what has to change in the graph at `now`.
     ///
-    /// The first step adopts the people whom the graph has already, so that a restarted observer
+    /// The first step takes up the figures that the world's node has (in place of those given), and
+    /// adopts the people whom the graph has already, so that a restarted observer
     /// goes on where it was. Without a `world` node nothing is written, because nothing can be
     /// placed. A refused transaction needs no care: the next step makes it again.
     ///
@@ -179,6 +203,9 @@ impl HumanObserver {
     ) -> Result<Transaction, ReadError> {
         let surroundings = surroundings(snapshot)?;
         if !self.adopted {
+            if let Some(config) = settings(snapshot)? {
+                *self = Self::new(config);
+            }
             for person in people(snapshot)? {
                 self.observer.adopt(&person);
             }

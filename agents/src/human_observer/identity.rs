@@ -48,7 +48,9 @@ impl Observer {
         let candidates = self.tracks.iter().enumerate().filter_map(|(index, track)| {
             let lost = track.id.is_some() && track.last_seen < new.born;
             let gap = new.born.since(track.last_seen);
-            let reach = config.handover_distance + config.handover_speed * gap;
+            // Whoever cameras look for in vain did not get far in their views.
+            let unwatched = (gap - track.watched()).max(0.0);
+            let reach = config.handover_distance + config.handover_speed * unwatched;
             let distance = track.distance_to(new.position());
             // Where one leaves and another comes by the same door, they face opposite ways.
             let turned = gap < config.remembered && track.faces_away_from(new);

@@ -26,9 +26,8 @@ pub(super) struct Track {
     look_count: u32,
     /// Probability that somebody is there.
     pub(super) existence: f64,
-    /// Seconds that cameras looked and saw nobody, since last seen.
+    /// Seconds that cameras looked and saw nobody since last seen, summed over the cameras.
     watched: f64,
-    watched_until: Time,
 }
 
 /// A detection in the world frame.
@@ -88,7 +87,6 @@ impl Track {
             look_count: 1,
             existence: 0.5,
             watched: 0.0,
-            watched_until: sighting.time,
         }
     }
 
@@ -271,21 +269,17 @@ impl Track {
         self.last_place = self.position();
         self.last_frame = frame;
         self.watched = 0.0;
-        self.watched_until = self.last_seen;
         self.look(true);
         // A detector that gives 1 is trusted ten times over, one that gives 0 not at all.
         let present = self.existence * (1.0 + 9.0 * sighting.score.clamp(0.0, 1.0));
         self.existence = (present / (present + 1.0 - self.existence)).min(0.999);
     }
 
-    /// A camera looked at `time` and did not see it.
-    pub(super) fn missed(&mut self, time: Time, config: &Tracking) {
-        // Several cameras that look at once watch for the same second.
-        let since = time.since(self.watched_until);
-        if since > 0.0 {
-            self.watched += since.min(config.look_time);
-            self.watched_until = time;
-        }
+    /// A camera looked at `time`, for the first time in `since` seconds, and did not see it. Cameras
+    /// overlook somebody each for reasons of its own, so what they looked in vain adds up.
+    pub(super) fn missed(&mut self, time: Time, since: f64, config: &Tracking) {
+        let unseen = time.since(self.last_seen).max(0.0);
+        self.watched += since.min(config.look_time).min(unseen);
         self.look(false);
         let present = self.existence * (1.0 - config.detection_probability);
         self.existence = present / (present + 1.0 - self.existence);
@@ -303,6 +297,11 @@ impl Track {
         (hits, self.look_count.min(considered) - hits)
     }
 
+    /// Hits among the last 32 looks.
+    pub(super) fn hits(&self) -> u32 {
+        self.looks.count_ones()
+    }
+
     /// Whether the evidence makes a person of it.
     pub(super) fn is_confirmable(&self, config: &Tracking) -> bool {
         self.evidence(config).0 >= config.confirmation_hits
@@ -311,6 +310,11 @@ impl Track {
     /// Whether the evidence speaks for the person being there, and not only for having been.
     pub(super) fn is_present(&self, config: &Tracking) -> bool {
         self.watched <= config.lost_in_view
+    }
+
+    /// For how long cameras have looked for it in vain, s, summed over the cameras.
+    pub(super) fn watched(&self) -> f64 {
+        self.watched
     }
 
     /// Whether the two headings differ by more than a right angle.
@@ -344,11 +348,11 @@ impl Track {
         }
     }
 
-    /// Whether a single detection no longer tells that it is the same person: the gate has grown so
-    /// wide that any false detection falls into it. Only a track with evidence of its own brings
-    /// somebody lost back.
+    /// Whether a single detection no longer tells that it is the same person: cameras have looked in
+    /// vain, or the gate has grown so wide that any false detection falls into it. Only a track with
+    /// evidence of its own brings somebody lost back.
     pub(super) fn is_lost(&self, now: Time, config: &Tracking) -> bool {
-        now.since(self.last_seen) > config.coast_time
+        now.since(self.last_seen) > config.coast_time || !self.is_present(config)
     }
 
     /// How far `place` is from where the person should be, or was last seen (people come back

@@ -192,6 +192,7 @@ front = { from = ["person"], to = ["robot"] }
 [attributes]
 transform = { kind = "pose" }
 walls = { kind = "f64_list" }
+observer_settings = { kind = "string" }
 polygon = { kind = "f64_list" }
 velocity = { kind = "vector" }
 radius = { kind = "f64" }

@@ -6,6 +6,7 @@ use super::reader::{Bound, Located, Problems, Table};
 use super::value::Preemption;
 use super::{Mission, Scenario, TracksFrame};
 use super::{devices, people, schedule, space};
+use agents::human_observer;
 use agents::social_mapping::SocialConfig;
 use dsr::Time;
 use jiff::Timestamp;
@@ -263,6 +264,7 @@ fn whole(table: &Table<'_>, text: &str, read: Read<'_>) -> Scenario {
     let rules = file(table, "rules", "rules.aggl", read);
     let tracks = tracks(table);
     let social = social(table);
+    let human_observer = human_observer(table);
     Scenario {
         name,
         folder: PathBuf::new(),
@@ -283,6 +285,7 @@ fn whole(table: &Table<'_>, text: &str, read: Read<'_>) -> Scenario {
         rules,
         tracks,
         social,
+        human_observer,
     }
 }
 
@@ -363,6 +366,17 @@ pub fn parse_social(file: &str, text: &str) -> Result<SocialConfig, Box<Invalid>
         }
     };
     read().map_err(|problems| Box::new(Invalid::new(file, text, problems)))
+}
+
+/// The figures of the human observer; those not given have their defaults.
+fn human_observer(scenario: &Table<'_>) -> human_observer::Config {
+    let config: human_observer::Config = scenario.deserialize("human_observer").unwrap_or_default();
+    if let Some(problem) = config.problem() {
+        let message = problem.to_owned();
+        let span = scenario.span_of("human_observer");
+        scenario.problems.add(ProblemKind::Figure { message }, span);
+    }
+    config
 }
 
 /// The figures of social mapping; those not given have their defaults.

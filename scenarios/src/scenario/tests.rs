@@ -222,7 +222,8 @@ end = "10:00"
              6 │ 
                ╰────
               help: known are: start, name, duration, room, door, wall, bounds, place, object,
-                    camera, robot, person, stream, activity, mission, rules, tracks, social
+                    camera, robot, person, stream, activity, mission, rules, tracks, social,
+                    human_observer
 
             Error: 
               × room `hall` has 2 corners, a polygon needs at least 3

@@ -3,6 +3,7 @@
 
 mod drives;
 mod flexible_density;
+mod perception;
 mod social_groups;
 mod social_shapes;
 mod table;
@@ -39,6 +40,11 @@ const EXPERIMENTS: &[Experiment] = &[
         name: "td-gains",
         about: "the search for the gains of the elastic band (TD 5.4)",
         run: drives::gains,
+    },
+    Experiment {
+        name: perception::NAME,
+        about: "people tracked through four cameras that err, beside SORT-style tracking",
+        run: |seeds| perception::perception(seeds, None),
     },
     Experiment {
         name: "fd-table1",
@@ -83,9 +89,23 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
         return Ok(Answer::Yes);
     }
     let experiment = find(&arguments.name)?;
-    let table = (experiment.run)(arguments.seeds)?;
+    let table = match &arguments.tracks {
+        None => (experiment.run)(arguments.seeds)?,
+        Some(tracks) if experiment.name == perception::NAME => {
+            perception::perception(arguments.seeds, Some(tracks))?
+        }
+        Some(_) => {
+            let what = format!("`{}` knows no recorded tracks", experiment.name);
+            let help = format!("`--tracks` is for `{}`", perception::NAME);
+            return Err(Failure::input_with_help(what, help));
+        }
+    };
     if arguments.json {
-        print_json(&table.json(experiment.name, experiment.about))?;
+        let mut json = table.json(experiment.name, experiment.about);
+        if experiment.name == perception::NAME {
+            perception::put_on_top(&mut json);
+        }
+        print_json(&json)?;
     } else {
         print(&table.text(experiment.name, experiment.about))?;
     }

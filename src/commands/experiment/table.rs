@@ -24,6 +24,8 @@ pub(super) struct Row {
 #[derive(Clone)]
 pub(super) struct Cell {
     ours: Figure,
+    /// Digits after the point, for people.
+    digits: usize,
     printed: Option<Figure>,
     /// How far apart the two may lie.
     tolerance: f64,
@@ -42,15 +44,25 @@ impl Cell {
     pub(super) fn number(ours: f64) -> Self {
         Self {
             ours: Figure::Number(ours),
+            digits: 2,
             printed: None,
             tolerance: 0.0,
             deviation: None,
         }
     }
 
+    /// A figure of which the fifth digit counts.
+    pub(super) fn fine(ours: f64) -> Self {
+        Self {
+            digits: 5,
+            ..Self::number(ours)
+        }
+    }
+
     pub(super) fn numbers(ours: f64, printed: f64, tolerance: f64) -> Self {
         Self {
             ours: Figure::Number(ours),
+            digits: 2,
             printed: Some(Figure::Number(printed)),
             tolerance,
             deviation: None,
@@ -68,6 +80,7 @@ impl Cell {
     pub(super) fn text(ours: impl Into<String>) -> Self {
         Self {
             ours: Figure::Text(ours.into()),
+            digits: 2,
             printed: None,
             tolerance: 0.0,
             deviation: None,
@@ -77,6 +90,7 @@ impl Cell {
     pub(super) fn texts(ours: impl Into<String>, printed: impl Into<String>) -> Self {
         Self {
             ours: Figure::Text(ours.into()),
+            digits: 2,
             printed: Some(Figure::Text(printed.into())),
             tolerance: 0.0,
             deviation: None,
@@ -94,7 +108,7 @@ impl Cell {
     }
 
     fn text_form(&self) -> String {
-        let mut text = self.ours.text_form();
+        let mut text = self.ours.text_form(self.digits);
         if let Some(deviation) = self.deviation {
             // Writing to a string does not fail.
             let _ = write!(text, " ({deviation:.2})");
@@ -103,7 +117,7 @@ impl Cell {
             None => text,
             Some(printed) => {
                 let mark = if self.agrees() { "" } else { " !" };
-                format!("{text} | {}{mark}", printed.text_form())
+                format!("{text} | {}{mark}", printed.text_form(self.digits))
             }
         }
     }
@@ -126,9 +140,9 @@ impl Cell {
 }
 
 impl Figure {
-    fn text_form(&self) -> String {
+    fn text_form(&self, digits: usize) -> String {
         match self {
-            Self::Number(number) => format!("{number:.2}"),
+            Self::Number(number) => format!("{number:.digits$}"),
             Self::Text(text) => text.clone(),
         }
     }

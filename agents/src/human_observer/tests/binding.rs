@@ -276,3 +276,29 @@ fn a_damaged_pose_in_the_graph_is_written_over() {
     assert!((person.position() - Point2::new(2.0, 1.0)).norm() < 0.02);
     assert!(person.velocity.norm() < 0.1);
 }
+
+#[test]
+fn the_figures_of_the_world_are_taken_up_where_they_can_be_used() {
+    for (settings, association) in [
+        (
+            r#"{"tracking":{"association":"nearest"}}"#,
+            Association::Nearest,
+        ),
+        (
+            r#"{"tracking":{"association":"nearest","position_noise":-1}}"#,
+            Association::Evidence,
+        ),
+        ("none", Association::Evidence),
+    ] {
+        let mut home = Home::new(USUAL);
+        let mut change = Transaction::new();
+        change.set("world", SETTINGS, settings);
+        home.commit("loader", &change);
+        home.go(PERIOD, &[]);
+        assert_eq!(
+            home.agent.observer().config.association,
+            association,
+            "{settings}"
+        );
+    }
+}

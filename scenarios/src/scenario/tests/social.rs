@@ -1,6 +1,8 @@
-//! The table `[social]`: every figure by name, what is not given by default, and what cannot be.
+//! The tables of the agents' figures, `[social]` and `[human_observer]`: every figure by name, what is
+//! not given by default, and what cannot be.
 
 use super::*;
+use agents::human_observer::Association;
 use agents::social_mapping::groups::Method;
 use agents::social_mapping::{AsymmetricGaussian, SocialConfig};
 
@@ -55,4 +57,28 @@ fn what_social_mapping_cannot_use_is_told_with_its_place() {
     let problems = with("[social]\nresolution = 0\nclearance_cost = -1");
     assert_eq!(problems.len(), 2, "{problems:?}");
     assert!(problems[0].contains("resolution must be a finite length greater than 0"));
+}
+
+#[test]
+fn the_human_observers_figures_are_read_and_unusable_ones_told() {
+    let with = |table: &str| parse(&format!("{TWO_ROOMS}\n{table}"));
+    let config = with("[human_observer.tracking]\nassociation = \"nearest\"\nposition_noise = 0.2")
+        .expect("a good file")
+        .human_observer;
+    assert_eq!(config.tracking.association, Association::Nearest);
+    assert!((config.tracking.position_noise - 0.2).abs() < 1e-12);
+    for (table, says) in [
+        (
+            "[human_observer.tracking]\nposition_noise = 0.0",
+            "greater than 0",
+        ),
+        (
+            "[human_observer.tracking]\nassociation = \"sort\"",
+            "unknown variant `sort`",
+        ),
+    ] {
+        let invalid = with(table).expect_err("a bad file");
+        let told = invalid.problems[0].kind.to_string();
+        assert!(told.contains(says), "{told}");
+    }
 }

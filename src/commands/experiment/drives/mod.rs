@@ -12,13 +12,13 @@ use crate::Failure;
 use scenarios::Scenario;
 
 /// The scenario of that text.
-fn scene(name: &str, text: &str) -> Result<Scenario, Failure> {
+pub(super) fn scene(name: &str, text: &str) -> Result<Scenario, Failure> {
     let no_file = |_: &str| Ok(String::new());
     Scenario::parse(name, text, &no_file).map_err(Failure::internal)
 }
 
 /// Mean and standard deviation; of one value there is none.
-fn spread(values: &[f64]) -> (f64, f64) {
+pub(super) fn spread(values: &[f64]) -> (f64, f64) {
     let count = values.len().max(1) as f64;
     let mean = values.iter().sum::<f64>() / count;
     let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
