@@ -2,16 +2,20 @@
 
 mod bench;
 mod graph;
+mod inspect;
 mod mission;
 mod path;
 mod recording;
+mod shell;
 mod social;
 
 pub(crate) use bench::{Bench, BenchAction, BenchPeer};
 pub(crate) use graph::{ExportFormat, Graph, GraphAction, GraphSource, Watch};
+pub(crate) use inspect::Inspect;
 pub(crate) use mission::{Mission, MissionAction, SubmitMission, Why};
 pub(crate) use path::{CostModel, Path, PathAlgorithm};
 pub(crate) use recording::{Record, Replay};
+pub(crate) use shell::{Completions, Man, New, NewThing};
 pub(crate) use social::{Experiment, Social, SocialAction, SocialPicture};
 
 use clap::{Args, Parser, Subcommand};
@@ -65,6 +69,12 @@ pub(crate) enum Verb {
         cortex why 'robot-in->corridor'\n  cortex why ana.position"
     )]
     Why(Why),
+    /// Look at a running instance or a recording: in a browser, or in this terminal
+    #[command(
+        after_help = "Examples:\n  cortex inspect --web\n  cortex inspect --web 127.0.0.1:8000 --allow-edit\n  \
+        cortex inspect --web --file run.mcap\n  cortex inspect --tui"
+    )]
+    Inspect(Inspect),
     /// Record a running instance into an MCAP file
     #[command(after_help = "Ends with the instance, or when it is interrupted.\n\n\
         Example:\n  cortex record run.mcap --instance default")]
@@ -98,6 +108,17 @@ pub(crate) enum Verb {
     /// Tell what on this host keeps instances from running well, and what to do about it
     #[command(after_help = "Example:\n  cortex doctor --mend")]
     Doctor(Doctor),
+    /// Begin an agent or a scenario of one's own
+    #[command(after_help = "Examples:\n  cortex new agent polite\n  cortex new scenario flat")]
+    New(New),
+    /// Print what makes a shell complete `cortex` verbs and flags
+    #[command(
+        after_help = "Example:\n  cortex completions bash > ~/.local/share/bash-completion/completions/cortex"
+    )]
+    Completions(Completions),
+    /// Write manual pages
+    #[command(after_help = "Example:\n  cortex man ~/.local/share/man/man1")]
+    Man(Man),
 }
 
 #[derive(Debug, Clone, Args)]
@@ -154,6 +175,9 @@ pub(crate) struct Run {
     /// Record the run into this MCAP file
     #[arg(long, value_name = "FILE")]
     pub(crate) record: Option<PathBuf>,
+    /// Show the run in a browser, at this address [default: 127.0.0.1:7710]
+    #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = inspect::ADDRESS)]
+    pub(crate) inspect: Option<std::net::SocketAddr>,
     /// Folder for report.json, the map and the logs [default: reports/SCENARIO]
     #[arg(long, value_name = "DIR")]
     pub(crate) report: Option<PathBuf>,

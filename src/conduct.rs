@@ -33,6 +33,8 @@ pub(crate) struct Settings<'a> {
     pub(crate) state: Option<(&'a Path, bool)>,
     /// Where the run is recorded.
     pub(crate) record: Option<&'a Path>,
+    /// Where its page is.
+    pub(crate) inspect: Option<std::net::SocketAddr>,
     pub(crate) logs: PathBuf,
 }
 
@@ -177,6 +179,15 @@ impl<'a> Conductor<'a> {
             conductor.until_ready(recorder)?;
             conductor.recorder = Some(recorder);
         }
+        if let Some(address) = settings.inspect {
+            let inspector = conductor
+                .supervisor
+                .start(conductor.inspector_program(address))?;
+            conductor.until_ready(inspector)?;
+            conductor
+                .progress
+                .say(&format!("look at it at http://{address}/"));
+        }
         conductor.progress.say("starting the agents");
         for name in crate::commands::AGENTS {
             let program = conductor.agent_program(name, Policy::Restart);
@@ -222,6 +233,17 @@ impl<'a> Conductor<'a> {
         }
         Program {
             name: crate::commands::record::RECORDER.to_owned(),
+            arguments,
+            policy: Policy::Restart,
+        }
+    }
+
+    fn inspector_program(&self, address: std::net::SocketAddr) -> Program {
+        let mut arguments: Vec<OsString> = vec!["inspect".into(), "--supervised".into()];
+        arguments.extend(["--web".into(), address.to_string().into()]);
+        arguments.extend(["--instance".into(), self.settings.instance.name().into()]);
+        Program {
+            name: "inspector".to_owned(),
             arguments,
             policy: Policy::Restart,
         }

@@ -7,6 +7,7 @@ mod bench;
 mod cli;
 mod commands;
 mod conduct;
+mod inspect;
 mod manifests;
 mod progress;
 mod recording;

@@ -27,12 +27,17 @@ const SHIPPED: [(&str, &str); 7] = [
 
 /// The name that `cortex graph` goes by.
 pub(crate) const TERMINAL: &str = "cortex-graph";
+/// The name that the inspector goes by. It changes something only for who has its token.
+pub(crate) const INSPECTOR: &str = "inspector";
 
 /// The manifests of an instance: those of the program, then those of the scenario's folder
 /// `manifests`, of which one of the same agent counts instead.
 pub(crate) fn load(scenario: &Path, schema: &Schema) -> Result<Vec<Manifest>, Failure> {
     // The person at the terminal owns all of it anyway.
-    let mut manifests = vec![Manifest::everything(TERMINAL)];
+    let mut manifests = vec![
+        Manifest::everything(TERMINAL),
+        Manifest::everything(INSPECTOR),
+    ];
     for (name, text) in SHIPPED {
         let manifest = Manifest::from_toml(&format!("{name}.toml"), text, schema);
         manifests.push(manifest.map_err(|error| Failure::Internal(error.into()))?);
@@ -67,8 +72,8 @@ mod tests {
         let schema = scenarios::schema().unwrap();
         let manifests = load(Path::new("."), &schema).unwrap();
         let agents: Vec<&str> = manifests.iter().map(Manifest::agent).collect();
-        assert_eq!(agents[0], TERMINAL);
-        for ((name, _), agent) in SHIPPED.iter().zip(&agents[1..]) {
+        assert_eq!(agents[..2], [TERMINAL, INSPECTOR]);
+        for ((name, _), agent) in SHIPPED.iter().zip(&agents[2..]) {
             assert_eq!(name, agent);
         }
         for agent in crate::commands::AGENTS {

@@ -246,7 +246,7 @@ fn of_file(
 }
 
 /// Whether the goal can be read, and says nothing that the graph's schema does not know.
-fn check_goal(goal: &str, file: &str, snapshot: &Snapshot) -> Result<(), Failure> {
+pub(crate) fn check_goal(goal: &str, file: &str, snapshot: &Snapshot) -> Result<(), Failure> {
     let grammar = grammar::Grammar {
         types: grammar::Types::of_schema(snapshot.schema()),
         ..grammar::Grammar::default()

@@ -5,7 +5,9 @@ mod bench;
 mod doctor;
 mod experiment;
 pub(crate) mod graph;
-mod mission;
+mod inspect;
+pub(crate) mod mission;
+mod new;
 mod output;
 mod path;
 mod plan;
@@ -13,11 +15,13 @@ pub(crate) mod record;
 mod replay;
 mod rules;
 mod run;
+mod shell;
 mod social;
 mod store;
-mod why;
+pub(crate) mod why;
 
 pub(crate) use agent::AGENTS;
+pub(crate) use output::value_text;
 
 use crate::cli::Verb;
 use crate::{Answer, Failure};
@@ -39,6 +43,7 @@ pub(crate) fn perform(verb: Verb) -> Result<Answer, Failure> {
         Verb::Plan(arguments) => plan::run(&arguments),
         Verb::Mission(arguments) => mission::run(&arguments),
         Verb::Why(arguments) => why::run(&arguments),
+        Verb::Inspect(arguments) => inspect::run(&arguments),
         Verb::Record(arguments) => record::run(&arguments),
         Verb::Replay(arguments) => replay::run(&arguments),
         Verb::Bench(arguments) => bench::run(&arguments),
@@ -49,6 +54,9 @@ pub(crate) fn perform(verb: Verb) -> Result<Answer, Failure> {
         Verb::Social(arguments) => social::run(&arguments),
         Verb::Experiment(arguments) => experiment::run(&arguments),
         Verb::Doctor(arguments) => doctor::run(&arguments),
+        Verb::New(arguments) => new::run(&arguments),
+        Verb::Completions(arguments) => shell::completions(&arguments),
+        Verb::Man(arguments) => shell::man(&arguments),
     }
 }
 

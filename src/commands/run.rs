@@ -42,6 +42,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
         // The recorder writes on where there is something; this run begins anew.
         write(file, &[])?;
     }
+    if let Some(address) = arguments.inspect {
+        std::net::TcpListener::bind(address)
+            .map_err(|error| Failure::input(format!("cannot listen on {address}: {error}")))?;
+    }
     let spaces = object_spaces(&scenario, &scenario.social).map_err(Failure::input)?;
     let folder = arguments
         .report
@@ -107,6 +111,7 @@ impl Plan<'_> {
                 .filter(|_| !baseline)
                 .map(|folder| (folder, arguments.durable)),
             record: arguments.record.as_deref().filter(|_| !baseline),
+            inspect: arguments.inspect.filter(|_| !baseline),
             logs,
         };
         let mut progress = Progress::new(&title, arguments.json);

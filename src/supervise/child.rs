@@ -151,7 +151,7 @@ impl Child {
 }
 
 /// User and system time of a process, from `/proc/PID/stat` (proc(5), fields 14 and 15).
-fn cpu_seconds(pid: u32) -> Option<f64> {
+pub(crate) fn cpu_seconds(pid: u32) -> Option<f64> {
     let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
     // The second field, the command in parentheses, may hold anything.
     let (_, rest) = stat.rsplit_once(')')?;

@@ -3,6 +3,7 @@
 
 mod child;
 
+pub(crate) use child::cpu_seconds;
 use child::{Child, Event, EventKind};
 use dsr::{Instance, Tick, done_line};
 use std::ffi::OsString;

@@ -2,6 +2,8 @@
 //! recordings, for the inspector's page and for the terminal. Pure functions of a snapshot; they
 //! guarantee that a graph without people, robots or missions is only an emptier picture.
 
+pub(crate) mod graph;
 pub(crate) mod grid;
+pub(crate) mod layout;
 pub(crate) mod map;
 pub(crate) mod mission;

@@ -7,6 +7,7 @@
 
 mod algorithms;
 mod architecture;
+mod begin;
 mod bench;
 mod dependencies;
 mod doctor;
@@ -16,6 +17,7 @@ mod faults;
 mod graph;
 mod hostile;
 mod hot;
+mod inspect;
 mod large;
 mod leftovers;
 mod live_rules;

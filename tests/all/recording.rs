@@ -4,7 +4,7 @@
 use crate::support::{Program, Run, within};
 use serde_json::{Value as Json, json};
 use std::path::Path;
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 use std::time::Duration;
 
 const CARE_CENTRE: &str = "scenarios/care-centre";
@@ -81,6 +81,29 @@ fn a_recorded_run_is_looked_at_as_of_any_time_and_played_again_to_the_same_graph
     let refused = Program::run(&["graph", "set", "robot.max_speed", "1.0", "--file", file]);
     assert_eq!(refused.status.code(), Some(2));
     as_a_running_system(file);
+    in_python(file);
+}
+
+/// The tutorial's program reads the recording, where Python and the public package `mcap` are installed.
+#[allow(clippy::print_stderr, reason = "a test that did not look must say so")]
+fn in_python(file: &str) {
+    let known = Command::new("python3").args(["-c", "import mcap"]).output();
+    if !known.is_ok_and(|output| output.status.success()) {
+        eprintln!("SKIPPED: Python has no package mcap, so the tutorial's program was not run");
+        return;
+    }
+    let program = crate::examples::blocks("recording-in-python", "python").remove(0);
+    let output = Command::new("python3")
+        .args(["-c", &program, file])
+        .output();
+    let output = output.unwrap();
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    let failed = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{failed}");
+    assert!(
+        said.lines().count() > 3 && said.contains("person_"),
+        "{said}"
+    );
 }
 
 /// What a recording is played into is a graph like any other, with rules and agents on record.

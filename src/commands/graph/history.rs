@@ -6,7 +6,7 @@ use super::source::{Source, name_of};
 use crate::cli::GraphSource;
 use crate::commands::output::{Table, brief, dim, print, print_json, value_text};
 use crate::{Answer, Failure};
-use dsr::{Attribute, AttributeId, ReadError, Snapshot, Value, Version, json};
+use dsr::{Attribute, AttributeId, ReadError, Snapshot, Time, Value, Version, json};
 use serde_json::{Value as Json, json};
 use std::collections::btree_map::Entry::Vacant;
 use std::collections::{BTreeMap, BTreeSet};
@@ -23,35 +23,54 @@ struct Entry {
     value: Json,
 }
 
+fn oldest_time(newest: &Snapshot) -> Time {
+    let oldest = newest.at(newest.oldest());
+    oldest.map_or(newest.time(), |oldest| oldest.time())
+}
+
+/// What a path was, newest first, and the name of what it is about.
+fn entries(
+    newest: &Snapshot,
+    path: &str,
+    limit: Option<usize>,
+) -> Result<(Vec<Entry>, String), Failure> {
+    let (found, name) = locate(newest, path)?;
+    let entries = match &found.attribute {
+        None => of_thing(newest, found.thing),
+        Some(attribute) => {
+            let id = newest.schema().attribute_id(attribute);
+            of_attribute(newest, found.thing, id.map_err(Failure::input)?)
+        }
+    };
+    let mut entries = entries.map_err(Failure::internal)?;
+    entries.reverse();
+    entries.truncate(limit.unwrap_or(usize::MAX));
+    Ok((entries, name))
+}
+
+/// The history of a path for machines, newest first.
+pub(crate) fn rows(newest: &Snapshot, path: &str, limit: Option<usize>) -> Result<Json, Failure> {
+    let (entries, _) = entries(newest, path, limit)?;
+    let rows: Vec<Json> = entries.iter().map(row).collect();
+    Ok(json!({
+        "path": path, "oldest": newest.oldest().0, "oldest_time": oldest_time(newest).seconds(),
+        "newest": newest.version().0, "entries": rows,
+    }))
+}
+
 pub(super) fn history(
     source: &GraphSource,
     path: &str,
     limit: Option<usize>,
 ) -> Result<Answer, Failure> {
     let newest = Source::open(source)?.snapshot()?;
-    let oldest = newest.oldest();
-    let (found, name) = locate(&newest, path)?;
-    let entries = match &found.attribute {
-        None => of_thing(&newest, found.thing),
-        Some(attribute) => {
-            let id = newest.schema().attribute_id(attribute);
-            of_attribute(&newest, found.thing, id.map_err(Failure::input)?)
-        }
-    };
-    let mut entries = entries.map_err(Failure::internal)?;
-    entries.reverse();
-    entries.truncate(limit.unwrap_or(usize::MAX));
-    let oldest_time = newest
-        .at(oldest)
-        .map_or(newest.time(), |oldest| oldest.time());
     if source.json {
-        let rows: Vec<Json> = entries.iter().map(row).collect();
-        print_json(&json!({
-            "path": path, "oldest": oldest.0, "oldest_time": oldest_time.seconds(),
-            "newest": newest.version().0, "entries": rows,
-        }))?;
+        print_json(&rows(&newest, path, limit)?)?;
         return Ok(Answer::Yes);
     }
+    let oldest = newest.oldest();
+    let (entries, name) = entries(&newest, path, limit)?;
+    let oldest_time = oldest_time(&newest);
     let mut table = Table::new(&["version", "time/s", "agent", "rule", "value"]);
     for entry in &entries {
         table.row([

@@ -5,18 +5,33 @@ use super::source::Source;
 use crate::cli::GraphSource;
 use crate::commands::output::{print, print_json};
 use crate::{Answer, Failure};
-use dsr::{Operation, Transaction, Value, ValueKind, json};
+use dsr::{Operation, Snapshot, Transaction, Value, ValueKind, json};
 use serde_json::{Value as Json, json};
 
 pub(super) fn set(source: &GraphSource, path: &str, value: &str) -> Result<Answer, Failure> {
     let mut graph = Source::open(source)?;
-    let snapshot = graph.snapshot()?;
-    let (thing, name) = Path::find_attribute(&snapshot, path)?;
+    let transaction = transaction(&graph.snapshot()?, path, value)?;
+    let commit = graph.commit(&transaction)?;
+    if source.json {
+        print_json(&json!({"version": commit.version.0}))?;
+    } else {
+        print(&format!("version {}\n", commit.version))?;
+    }
+    Ok(Answer::Yes)
+}
+
+/// What sets an attribute to a value as it is written on the command line.
+pub(crate) fn transaction(
+    snapshot: &Snapshot,
+    path: &str,
+    value: &str,
+) -> Result<Transaction, Failure> {
+    let (thing, name) = Path::find_attribute(snapshot, path)?;
     let schema = snapshot.schema();
     let kind = match schema.attribute_id(&name) {
         Ok(id) => {
             let declared = schema.attributes().get(usize::from(id.0));
-            let now = thing.attribute(&snapshot, id).map_err(Failure::internal)?;
+            let now = thing.attribute(snapshot, id).map_err(Failure::internal)?;
             // Where the schema leaves it open, the value that is there says what it is.
             let now = now.map(|attribute| attribute.value.kind());
             declared.and_then(|declared| declared.kind).or(now)
@@ -30,17 +45,11 @@ pub(super) fn set(source: &GraphSource, path: &str, value: &str) -> Result<Answe
     })?;
     let mut transaction = Transaction::new();
     transaction.push(Operation::SetAttribute {
-        owner: thing.owner(&snapshot),
+        owner: thing.owner(snapshot),
         name,
         value,
     });
-    let commit = graph.commit(&transaction)?;
-    if source.json {
-        print_json(&json!({"version": commit.version.0}))?;
-    } else {
-        print(&format!("version {}\n", commit.version))?;
-    }
-    Ok(Answer::Yes)
+    Ok(transaction)
 }
 
 /// A value as it is written on the command line: JSON, and a bare word is a text, so that a shell

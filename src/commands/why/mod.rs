@@ -45,6 +45,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     Ok(Answer::Yes)
 }
 
+/// What brought something about, as text for people and as the fields of the verb's JSON.
+pub(crate) fn explain(snapshot: &Snapshot, what: Option<&str>) -> Result<Value, Failure> {
+    match tell(snapshot, what) {
+        Ok(told) => Ok(json!({"text": told.text, "told": told.json})),
+        Err(Untold::Read(error)) => Err(Failure::internal(error)),
+        Err(Untold::Said(failure)) => Err(failure),
+    }
+}
+
 /// Why nothing is told.
 enum Untold {
     /// The snapshot was overtaken, or is damaged.
