@@ -9,6 +9,37 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 const TICK: f64 = 0.05;
+const SHIPPED: [&str; 7] = [
+    "apartment",
+    "care-centre",
+    "corridor",
+    "flat",
+    "home",
+    "plaza",
+    "therapy-centre",
+];
+
+#[test]
+fn every_folder_with_a_scenario_is_listed_and_has_its_picture() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut found: Vec<String> = std::fs::read_dir(root)
+        .expect("the folder of the scenarios")
+        .map(|entry| entry.expect("an entry").path())
+        .filter(|folder| folder.join("scenario.toml").exists())
+        .filter_map(|folder| Some(folder.file_name()?.to_str()?.to_owned()))
+        .collect();
+    found.sort();
+    assert_eq!(found, SHIPPED);
+    let list = std::fs::read_to_string(root.join("README.md")).expect("the list");
+    for name in SHIPPED {
+        assert!(list.contains(&format!("({name}/README.md)")), "{name}");
+        let page = root.join(name).join("README.md");
+        let page = std::fs::read_to_string(page).expect("its page");
+        assert!(page.contains(&format!("images/{name}.png")), "{name}");
+        let picture = root.join(format!("../docs/src/images/{name}.png"));
+        assert!(picture.exists(), "{name}");
+    }
+}
 
 fn load(name: &str) -> Scenario {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(name);
@@ -35,7 +66,7 @@ fn watch(world: &mut World, seconds: f64, mut each: impl FnMut(&Truth)) {
 
 #[test]
 fn each_scenario_says_what_its_rules_and_the_vocabulary_know() {
-    for name in ["care-centre", "plaza"] {
+    for name in SHIPPED {
         let scenario = load(name);
         assert_eq!(scenario.name, name);
         let vocabulary = schema().expect("the schema as shipped");

@@ -95,6 +95,24 @@ fn the_care_centre_is_crossed_and_reported_beside_the_run_without_social_behavio
 }
 
 #[test]
+fn the_places_of_the_papers_are_crossed() {
+    for name in ["apartment", "corridor", "flat", "home", "therapy-centre"] {
+        let folder = format!("scenarios/{name}");
+        let arguments = [
+            folder.as_str(),
+            "--lockstep",
+            "--seed",
+            "1",
+            "--no-baseline",
+        ];
+        let (_, report) = report(Run::new(name, &arguments).succeed().path());
+        assert_eq!(report["scenario"], name);
+        assert_eq!(report["success"], true, "{name}");
+        assert_eq!(report["robot"]["collisions"], 0, "{name}");
+    }
+}
+
+#[test]
 fn the_plaza_is_crossed_there_and_back_among_walkers() {
     let folder = Run::new("plaza", &[PLAZA, "--lockstep", "--seed", "1"]).succeed();
     let (_, report) = report(folder.path());
