@@ -324,6 +324,43 @@ fn a_schedule_is_put_into_effect_while_the_system_runs_and_groups_are_in_its_gra
 }
 
 #[test]
+fn an_agenda_that_ends_before_it_starts_is_refused_wherever_one_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("missions")).unwrap();
+    for part in ["scenario.toml", "schedule.toml", "rules.aggl", "missions/invite.aggt"] {
+        let from = root().join("scenarios/care-centre").join(part);
+        fs::copy(from, folder.path().join(part)).unwrap();
+    }
+    let scenario = folder.path().to_str().unwrap();
+    let picture = folder.path().join("map.png");
+    let picture = picture.to_str().unwrap();
+    let today = fs::read_to_string(folder.path().join("schedule.toml")).unwrap();
+    let whole = fs::read_to_string(folder.path().join("scenario.toml")).unwrap();
+    let late = "\n[[activity]]\nname = \"late\"\nobject = \"desk\"\nstart = \"10:00\"\nend = \"09:59\"\n";
+    for (schedule, main, at) in [
+        (format!("{today}{late}"), whole.clone(), "schedule.toml:"),
+        (today.clone(), format!("{whole}{late}"), "scenario.toml:"),
+    ] {
+        save(&folder, "schedule.toml", &schedule);
+        save(&folder, "scenario.toml", &main);
+        for arguments in [
+            &["run", scenario][..],
+            &["social", "map", scenario, "--out", picture],
+            &["social", "density", scenario, "--out", picture],
+            &["agent", "world", "--scenario", scenario],
+            &["store", "--scenario", scenario],
+        ] {
+            let (code, _, err) = cortex(arguments);
+            assert_eq!(code, 2, "{arguments:?}: {err}");
+            assert!(
+                err.contains("ends before it starts") && err.contains(at),
+                "{arguments:?}: {err}"
+            );
+        }
+    }
+}
+
+#[test]
 fn what_cannot_be_used_is_refused_with_what_could() {
     let folder = tempfile::tempdir().unwrap();
     let file = recording(&folder, true);
@@ -335,7 +372,7 @@ fn what_cannot_be_used_is_refused_with_what_could() {
         (&["social", "groups", &broken][..], "line 2, column 8"),
         (
             &["social", "groups", &crowd],
-            "at most 20000 people, and here are 20001",
+            "20001 people stand too close to look for groups among them",
         ),
         (&["social", "groups", &file, "--method", "facng"], "facing"),
         (

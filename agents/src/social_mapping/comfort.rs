@@ -4,7 +4,7 @@
 //! the maximum (READING.md item 5).
 
 use super::gaussian::AsymmetricGaussian;
-use super::groups::{Grouping, TooManyPeople};
+use super::groups::{Grouping, TooCrowded};
 use super::scene::Wall;
 use super::stamps::distance_to_segment;
 use nalgebra::{Isometry2, Point2};
@@ -55,7 +55,7 @@ pub enum ComfortError {
     },
     /// Too many people to look for groups among.
     #[error(transparent)]
-    People(#[from] TooManyPeople),
+    People(#[from] TooCrowded),
 }
 
 /// What makes a place uncomfortable, and how much.

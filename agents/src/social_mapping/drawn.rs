@@ -4,7 +4,7 @@
 
 use super::config::SocialConfig;
 use super::found::FoundGroup;
-use super::groups::TooManyPeople;
+use super::groups::TooCrowded;
 use super::layers::{self, Layer};
 use super::map::PersonSpaces;
 use super::scene::{Object, Person, SocialScene, Wall};
@@ -32,7 +32,7 @@ pub(super) struct Drawn {
     /// outlines while their person does,
     pub(super) people: Vec<(Person, Arc<PersonSpaces>)>,
     /// and groups while everybody does.
-    pub(super) groups: Result<Arc<[FoundGroup]>, TooManyPeople>,
+    pub(super) groups: Result<Arc<[FoundGroup]>, TooCrowded>,
 }
 
 impl Drawn {

@@ -2,7 +2,7 @@
 
 use super::config::SocialConfig;
 use super::four_sided::FourSided;
-use super::groups::{GroupEntity, TooManyPeople};
+use super::groups::{GroupEntity, TooCrowded};
 use super::scene::Person;
 use nalgebra::{Isometry2, Point2};
 use std::borrow::Cow;
@@ -38,11 +38,11 @@ fn mean_features(all: &[&BTreeMap<String, f64>]) -> BTreeMap<String, f64> {
 /// The groups of those present.
 ///
 /// # Errors
-/// [`TooManyPeople`]: nobody is in a group then.
+/// [`TooCrowded`]: nobody is in a group then.
 pub(super) fn found_groups(
     config: &SocialConfig,
     people: &[Cow<'_, Person>],
-) -> Result<Vec<FoundGroup>, TooManyPeople> {
+) -> Result<Vec<FoundGroup>, TooCrowded> {
     let poses: Vec<Isometry2<f64>> = people.iter().map(|p| p.world_from_person).collect();
     let groups = config.grouping.groups(&poses)?;
     let person = FourSided::from(config.proxemics.shape);

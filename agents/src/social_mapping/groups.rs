@@ -19,12 +19,16 @@ pub use facing::Facing;
 pub use tracking::GroupTracker;
 pub use triangulation::Triangulation;
 
-use nalgebra::Isometry2;
+use self::near::Near;
+use nalgebra::{Isometry2, Point2};
 use serde::{Deserialize, Serialize};
 
-/// More people than this are not searched for groups: where so many share a few metres, the
-/// question has no answer in a turn.
-pub const MOST_PEOPLE: usize = 20_000;
+/// Where more pairs of people than this stand within some [`NEARBY`] metres of each other, groups are
+/// not looked for. A hundred thousand people who stand as close as a dense crowd does (five per square
+/// metre) are well below; only places that no bodies could take have more.
+pub const MOST_PAIRS: usize = 200_000_000;
+/// The side of the square cells by which pairs are counted: pairs within a cell and its neighbours, metres.
+pub const NEARBY: f64 = 8.0;
 
 /// How groups are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -71,12 +75,17 @@ pub struct Grouping {
     pub triangulation_strict: Triangulation,
 }
 
-/// Too many people to look for groups among.
+/// People stand closer than bodies can, and too many of them, to look for groups among.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("groups are looked for among at most {MOST_PEOPLE} people, and here are {count}")]
-pub struct TooManyPeople {
-    /// How many there are.
+#[error(
+    "{count} people stand too close to look for groups among them: {pairs} pairs within some \
+     {NEARBY} m of each other, where at most {MOST_PAIRS} are compared"
+)]
+pub struct TooCrowded {
+    /// How many people there are.
     pub count: usize,
+    /// How many pairs of them stand in one cell of [`NEARBY`] metres, or in two neighbouring ones.
+    pub pairs: usize,
 }
 
 impl Grouping {
@@ -99,18 +108,23 @@ impl Grouping {
     /// the groups in the order of their first members. Whose pose is not finite is in no group.
     ///
     /// # Errors
-    /// [`TooManyPeople`].
-    pub fn groups(&self, people: &[Isometry2<f64>]) -> Result<Vec<Vec<usize>>, TooManyPeople> {
+    /// [`TooCrowded`].
+    pub fn groups(&self, people: &[Isometry2<f64>]) -> Result<Vec<Vec<usize>>, TooCrowded> {
         let finite = |pose: &Isometry2<f64>| {
             pose.translation.vector.iter().all(|x| x.is_finite())
                 && pose.rotation.angle().is_finite()
         };
         let sound: Vec<usize> = (0..people.len()).filter(|i| finite(&people[*i])).collect();
-        if sound.len() > MOST_PEOPLE {
-            let count = sound.len();
-            return Err(TooManyPeople { count });
-        }
         let poses: Vec<Isometry2<f64>> = sound.iter().map(|i| people[*i]).collect();
+        let places: Vec<Point2<f64>> = poses
+            .iter()
+            .map(|pose| pose.translation.vector.into())
+            .collect();
+        let pairs = Near::new(&places, NEARBY).pairs();
+        if pairs > MOST_PAIRS {
+            let count = poses.len();
+            return Err(TooCrowded { count, pairs });
+        }
         let mut groups = match self.method {
             Method::Facing => self.facing.groups(&poses),
             Method::GaussianClustering => self.gaussian_clustering.groups(&poses),

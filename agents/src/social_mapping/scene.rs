@@ -3,7 +3,7 @@
 //! out or mended as its [`Rejection`] says, and always reported.
 
 use super::features::FeatureError;
-use super::groups::TooManyPeople;
+use super::groups::TooCrowded;
 use super::object_space::{Agenda, EndsBeforeStart, Outline};
 use dsr::Time;
 use nalgebra::{Isometry2, Point2, Vector2};
@@ -184,7 +184,7 @@ pub enum Rejection {
     },
     /// Nobody is in a group.
     #[error(transparent)]
-    Groups(#[from] TooManyPeople),
+    Groups(#[from] TooCrowded),
     /// The space between the two is left out.
     #[error("{name} and {other} interact, but nobody called {missing} has a place")]
     Interaction {

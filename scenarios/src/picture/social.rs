@@ -11,7 +11,7 @@ use super::label::{Labels, Look};
 use super::legend;
 use crate::situation::Situation;
 use agents::social_mapping::object_space::Outline;
-use agents::social_mapping::{Layer, SocialConfig, Update, Zone};
+use agents::social_mapping::{Layer, ObjectUse, SocialConfig, Update, UsageCurve, Zone};
 use cells::is_crowd;
 use nalgebra::{Point2, Vector2};
 use svg::Document;
@@ -123,22 +123,53 @@ fn map(
             .add(passing::passing(view, update, &config.proxemics.levels))
             .add(groups(view, update, config));
     }
-    group = group.add(walls(view, situation));
-    if !is_crowd(update) {
+    group = group
+        .add(space_edges(view, update, config))
+        .add(walls(view, situation));
+    if is_crowd(update) {
+        label_objects(view, update, &mut labels, |_| true);
+    } else {
         group = group.add(people(view, update, situation, &mut labels));
+        let least = |one: &ObjectUse| curve(config, one).least;
+        label_objects(view, update, &mut labels, |one| one.usage > least(one));
         label_groups(view, update, &mut labels);
+        label_objects(view, update, &mut labels, |one| one.usage <= least(one));
     }
-    for one in &update.objects {
+    group.add(labels.draw())
+}
+
+/// Names and R(t) of the objects that are `wanted`: on the object, or beside it.
+fn label_objects(
+    view: &View,
+    update: &Update,
+    labels: &mut Labels,
+    wanted: impl Fn(&ObjectUse) -> bool,
+) {
+    for one in update.objects.iter().filter(|one| wanted(one)) {
         let look = Look {
             size: 11.0,
             colour: INK,
             bold: false,
         };
         let words = format!("{} R = {:.2}", one.name, one.usage);
-        let centre = Point2::from(one.world_from_object.translation.vector);
-        labels.centred(view.page(centre), &words, look);
+        let centre = view.page(one.world_from_object.translation.vector.into());
+        if !labels.centred(centre, &words, look) {
+            labels.beside(centre, view.px(0.5), &words, look);
+        }
     }
-    group.add(labels.draw())
+}
+
+fn curve<'a>(config: &'a SocialConfig, one: &ObjectUse) -> &'a UsageCurve {
+    config.usage_of.get(&one.name).unwrap_or(&config.usage)
+}
+
+/// The edges of objects' spaces, over people's, which may cover a small one whole.
+fn space_edges(view: &View, update: &Update, config: &SocialConfig) -> Group {
+    let layer = Group::new().set("fill", "none").set("stroke-width", "1.6");
+    update.objects.iter().fold(layer, |group, one| {
+        let edge = view.polygon(one.space.iter().copied());
+        group.add(edge.set("stroke", usage_colour(config, one)))
+    })
 }
 
 /// The dearest cost that is not blocked (personal space).
@@ -157,21 +188,22 @@ fn cost_colour(cost: f32) -> Option<String> {
 fn spaces(view: &View, update: &Update, config: &SocialConfig) -> Group {
     let objects = &update.objects;
     objects.iter().fold(Group::new(), |group, one| {
-        let curve = config.usage_of.get(&one.name).unwrap_or(&config.usage);
-        let share = if curve.most > curve.least {
-            (one.usage - curve.least) / (curve.most - curve.least)
-        } else {
-            0.0
-        };
-        let colour = heat(share);
         group.add(
             view.polygon(one.space.iter().copied())
-                .set("fill", colour.as_str())
-                .set("fill-opacity", "0.45")
-                .set("stroke", colour.as_str())
-                .set("stroke-width", "1.2"),
+                .set("fill", usage_colour(config, one))
+                .set("fill-opacity", "0.45"),
         )
     })
+}
+
+fn usage_colour(config: &SocialConfig, one: &ObjectUse) -> String {
+    let curve = curve(config, one);
+    let share = if curve.most > curve.least {
+        (one.usage - curve.least) / (curve.most - curve.least)
+    } else {
+        0.0
+    };
+    heat(share)
 }
 
 /// Bands of density: everybody's outlines of one level lie under everybody's of the next, so that

@@ -67,7 +67,7 @@ pub(super) fn run(file: &Path, method: Method, json: bool) -> Result<Answer, Fai
 fn find(
     recording: &Recording,
     method: Method,
-) -> Result<Vec<Groups>, agents::social_mapping::groups::TooManyPeople> {
+) -> Result<Vec<Groups>, agents::social_mapping::groups::TooCrowded> {
     let grouping = Grouping::of(method);
     let frames = recording.frames.iter();
     frames

@@ -231,6 +231,8 @@ impl Partition {
     /// Moves people one by one to a neighbour's set, or away, where that pays.
     fn move_people(&mut self, scene: &Scene) -> bool {
         let mut moved = false;
+        let empty = |set: &usize| self.sets[*set].is_empty();
+        let mut free: BTreeSet<usize> = (0..self.sets.len()).filter(empty).collect();
         for person in 0..self.set_of.len() {
             let own = self.set_of[person];
             if self.sets[own].len() < 2 {
@@ -253,10 +255,10 @@ impl Partition {
                 continue;
             }
             // Of a set of two or more, whoever leaves finds some set empty: there are as many as people.
-            let free = || self.sets.iter().position(Vec::is_empty);
-            let Some(target) = best.1.or_else(free) else {
+            let Some(target) = best.1.or_else(|| free.first().copied()) else {
                 continue;
             };
+            free.remove(&target);
             self.sets[own].retain(|member| *member != person);
             self.sets[target].push(person);
             self.set_of[person] = target;

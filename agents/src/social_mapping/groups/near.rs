@@ -27,16 +27,30 @@ impl<'a> Near<'a> {
 
     /// Everybody within the reach of `point`, in an order that depends on the places alone.
     pub(super) fn around(&self, point: Point2<f64>) -> impl Iterator<Item = usize> + '_ {
-        let [column, row] = cell(point, self.reach);
+        self.block(cell(point, self.reach))
+            .flatten()
+            .copied()
+            .filter(move |index| (self.places[*index] - point).norm() <= self.reach)
+    }
+
+    /// How many pairs of people there are who stand in one cell or in two that touch.
+    pub(super) fn pairs(&self) -> usize {
+        let ordered: usize = self
+            .cells
+            .iter()
+            .map(|(cell, here)| here.len() * (self.block(*cell).map(Vec::len).sum::<usize>() - 1))
+            .sum();
+        ordered / 2
+    }
+
+    /// The people of a cell and of those that touch it.
+    fn block(&self, [column, row]: [i64; 2]) -> impl Iterator<Item = &Vec<usize>> + '_ {
         (row.saturating_sub(1)..=row.saturating_add(1))
             .flat_map(move |row| {
                 (column.saturating_sub(1)..=column.saturating_add(1))
                     .map(move |column| [column, row])
             })
             .filter_map(|key| self.cells.get(&key))
-            .flatten()
-            .copied()
-            .filter(move |index| (self.places[*index] - point).norm() <= self.reach)
     }
 }
 

@@ -43,13 +43,33 @@ fn whose_pose_is_no_place_is_in_no_group() {
     }
 }
 
+/// Pairs face to face on a lattice, 2 m from pair to pair, and what they are: (0, 1), (2, 3) ...
+fn pairs_on_a_lattice(count: usize) -> (Vec<Isometry2<f64>>, Vec<Vec<usize>>) {
+    let people = (0..count).flat_map(|k| {
+        let (column, row) = (k % 250, k / 250);
+        facing_centre(2.0 * column as f64, 2.0 * row as f64, 0.3, 2)
+    });
+    let groups = (0..count).map(|k| vec![2 * k, 2 * k + 1]);
+    (people.collect(), groups.collect())
+}
+
 #[test]
-fn more_people_than_can_be_searched_are_refused() {
-    let people = vec![Isometry2::identity(); MOST_PEOPLE + 1];
+fn a_hundred_thousand_people_are_grouped() {
+    let (people, expected) = pairs_on_a_lattice(50_000);
+    assert_eq!(groups(Method::GaussianClustering, &people), expected);
+    assert_eq!(groups(Method::Facing, &people), expected);
+    // It knows no pairs; triangles of four people on such a lattice do not face their middle.
+    assert!(groups(Method::TriangulationStrict, &people).is_empty());
+}
+
+#[test]
+fn more_people_than_bodies_fit_are_refused() {
+    let people = vec![Isometry2::identity(); 20_001];
     let error = Grouping::default().groups(&people).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "groups are looked for among at most 20000 people, and here are 20001"
+        "20001 people stand too close to look for groups among them: 200010000 pairs within some \
+         8 m of each other, where at most 200000000 are compared"
     );
 }
 

@@ -6,6 +6,7 @@ use super::mesh::Mesh;
 use super::union::Union;
 use nalgebra::{Isometry2, Point2};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// The paper's two rules. It gives its lengths in units of its pictures (0.40, 0.32 of their side)
 /// and the vectors' length not at all; these are metres.
@@ -60,14 +61,20 @@ impl Triangulation {
             union.join(t[0], t[1]);
             union.join(t[1], t[2]);
         }
+        // Corners come in order, so a side has one name.
+        let mut by_side: BTreeMap<[usize; 2], Vec<&[usize; 3]>> = BTreeMap::new();
+        for t in &main {
+            for side in [[t[0], t[1]], [t[0], t[2]], [t[1], t[2]]] {
+                by_side.entry(side).or_default().push(t);
+            }
+        }
         // A peripheral triangle shares a side with a main one; its third corner comes in where that
         // person's vector ends in the peripheral triangle or in the main one.
         for t in &others {
             for outer in 0..3 {
-                let (person, base) = (t[outer], [t[(outer + 1) % 3], t[(outer + 2) % 3]]);
-                let beside = main
-                    .iter()
-                    .find(|m| base.iter().all(|corner| m.contains(corner)));
+                let [a, b] = [t[(outer + 1) % 3], t[(outer + 2) % 3]];
+                let (person, base) = (t[outer], [a.min(b), a.max(b)]);
+                let beside = by_side.get(&base).and_then(|beside| beside.first());
                 if beside.is_some_and(|m| ends_in(person, t) || ends_in(person, m)) {
                     union.join(person, base[0]);
                 }
