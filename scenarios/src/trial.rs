@@ -1,4 +1,4 @@
-//! One drive of the robot through a scenario to a place: the world, social mapping and navigation in one
+//! One drive of the robot through a scenario to its targets: the world, social mapping and navigation in one
 //! process, without a graph. What experiments repeat many times over. This file guarantees that a trial is
 //! a function of its scenario and seed, to the bit.
 //!
@@ -11,10 +11,10 @@ use crate::world::{Inputs as WorldInputs, Truth, World};
 use agents::navigation::control::Limits;
 use agents::navigation::navigator::{Config, Inputs, Navigator, Status};
 use agents::navigation::people::Person;
-use agents::navigation::target::{Target, Task};
+use agents::navigation::target::{Company, Target, Task};
 use agents::social_mapping::scene::{Activity, Manner, Person as MappedPerson, SceneError};
-use agents::social_mapping::{ConfigError, SocialConfig, SocialMapper, SocialScene};
-use nalgebra::{Isometry2, Point2};
+use agents::social_mapping::{ConfigError, SocialMapper, SocialScene};
+use nalgebra::Isometry2;
 
 /// From one turn of everything to the next, s.
 const STEP: f64 = 0.1;
@@ -30,8 +30,8 @@ pub struct Trial<'a> {
     pub seed: u64,
     /// Whether people and objects are more than obstacles.
     pub social: bool,
-    /// Where the robot is to get.
-    pub goal: Point2<f64>,
+    /// What the robot is to get to, one after the other.
+    pub targets: Vec<Target>,
     /// The figures of navigation.
     pub navigation: Config,
     /// From this second on the robot knows the scenario's agenda; before, it knows none.
@@ -43,8 +43,10 @@ pub struct Trial<'a> {
 pub struct Drive {
     /// What was true, step by step.
     pub samples: Vec<Truth>,
-    /// Whether the robot got there within the scenario's duration.
+    /// Whether the robot got to all targets within the scenario's duration.
     pub arrived: bool,
+    /// After how many samples it got to each target.
+    pub legs: Vec<usize>,
     /// How many paths it took up.
     pub plans: u64,
 }
@@ -71,14 +73,10 @@ impl Trial<'_> {
     pub fn drive(&self) -> Result<Drive, TrialError> {
         let scenario = self.scenario;
         let mut world = World::new(scenario, self.seed, None);
-        let mut mapper = SocialMapper::new(SocialConfig::default())
+        let mut mapper = SocialMapper::new(scenario.social.clone())
             .map_err(|problems| TrialError::Config { problems })?;
         let mut scene = self.scene();
         let mut navigator = Navigator::new(self.navigation);
-        let task = Task {
-            id: "trial".to_owned(),
-            target: Target::Point(self.goal),
-        };
         let robot = &scenario.robot;
         let limits = Limits {
             radius: robot.radius,
@@ -90,7 +88,7 @@ impl Trial<'_> {
         let mut samples = vec![world.truth()];
         let (mut scan, mut odometry, mut grid) = (None, None, None);
         let mut command = None;
-        let mut arrived = false;
+        let mut legs = Vec::new();
         for step in 0..(scenario.duration / STEP) as usize {
             let outputs = world.step(
                 STEP,
@@ -102,11 +100,19 @@ impl Trial<'_> {
             scan = outputs.scan.or(scan);
             odometry = outputs.odometry.or(odometry);
             let truth = outputs.truth;
+            let Some(target) = self.targets.get(legs.len()) else {
+                break;
+            };
+            let task = Task {
+                id: format!("leg {}", legs.len()),
+                target: target.clone(),
+            };
             if step % MAPPING == 0 {
                 if step as f64 * STEP >= self.agenda_from && scene.activities.is_empty() {
                     scene.activities = self.agenda();
                 }
-                scene.people = truth.people.iter().map(mapped_person).collect();
+                let people = truth.people.iter();
+                scene.people = people.map(|body| mapped_person(body, target)).collect();
                 grid = Some(mapper.update(truth.time, &scene)?.grid);
             }
             let people: Vec<Person> = truth.people.iter().map(known_person).collect();
@@ -126,14 +132,16 @@ impl Trial<'_> {
                 },
             );
             command = Some(output.command);
-            arrived = output.status == Status::Arrived;
-            if arrived || matches!(output.status, Status::Failed(_)) {
-                break;
+            match output.status {
+                Status::Arrived => legs.push(samples.len()),
+                Status::Failed(_) => break,
+                _ => {}
             }
         }
         Ok(Drive {
             samples,
-            arrived,
+            arrived: legs.len() == self.targets.len(),
+            legs,
             plans: navigator.plans(),
         })
     }
@@ -160,13 +168,27 @@ impl Trial<'_> {
     }
 }
 
-fn mapped_person(body: &crate::world::Body) -> MappedPerson {
+/// Somebody as social mapping knows them; who is approached or escorted wants the robot nearer.
+fn mapped_person(body: &crate::world::Body, target: &Target) -> MappedPerson {
+    let task = match target {
+        Target::Person { .. } => Some("approach"),
+        Target::Company {
+            place: Company::Beside,
+            ..
+        } => Some("escort"),
+        Target::Company { .. } => Some("follow"),
+        _ => None,
+    };
+    let meant = target.person() == Some(&body.name);
     MappedPerson {
         name: body.name.clone(),
         world_from_person: Isometry2::new(body.position.coords, body.heading),
         velocity: body.velocity,
         radius: body.radius,
-        manner: Manner::default(),
+        manner: Manner {
+            task: task.filter(|_| meant).map(str::to_owned),
+            ..Manner::default()
+        },
     }
 }
 
@@ -182,6 +204,7 @@ fn known_person(body: &crate::world::Body) -> Person {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::{Point2, Vector2};
 
     #[test]
     fn a_trial_gets_there_and_is_the_same_to_the_bit() {
@@ -192,14 +215,14 @@ mod tests {
             scenario: &scenario,
             seed: 3,
             social: true,
-            goal: Point2::new(4.0, 6.0),
+            targets: vec![Target::Point(Point2::new(4.0, 6.0))],
             navigation: Config::default(),
             agenda_from: 0.0,
         };
         let drive = trial.drive().unwrap();
         assert!(drive.arrived);
         let last = drive.samples.last().unwrap().world_from_robot;
-        assert!((last.translation.vector - trial.goal.coords).norm() < 0.3);
+        assert!((last.translation.vector - Vector2::new(4.0, 6.0)).norm() < 0.3);
         assert_eq!(trial.drive().unwrap(), drive);
     }
 }

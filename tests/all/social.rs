@@ -327,7 +327,12 @@ fn a_schedule_is_put_into_effect_while_the_system_runs_and_groups_are_in_its_gra
 fn an_agenda_that_ends_before_it_starts_is_refused_wherever_one_is_read() {
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("missions")).unwrap();
-    for part in ["scenario.toml", "schedule.toml", "rules.aggl", "missions/invite.aggt"] {
+    for part in [
+        "scenario.toml",
+        "schedule.toml",
+        "rules.aggl",
+        "missions/invite.aggt",
+    ] {
         let from = root().join("scenarios/care-centre").join(part);
         fs::copy(from, folder.path().join(part)).unwrap();
     }
@@ -336,7 +341,8 @@ fn an_agenda_that_ends_before_it_starts_is_refused_wherever_one_is_read() {
     let picture = picture.to_str().unwrap();
     let today = fs::read_to_string(folder.path().join("schedule.toml")).unwrap();
     let whole = fs::read_to_string(folder.path().join("scenario.toml")).unwrap();
-    let late = "\n[[activity]]\nname = \"late\"\nobject = \"desk\"\nstart = \"10:00\"\nend = \"09:59\"\n";
+    let late =
+        "\n[[activity]]\nname = \"late\"\nobject = \"desk\"\nstart = \"10:00\"\nend = \"09:59\"\n";
     for (schedule, main, at) in [
         (format!("{today}{late}"), whole.clone(), "schedule.toml:"),
         (today.clone(), format!("{whole}{late}"), "scenario.toml:"),
@@ -416,7 +422,10 @@ fn every_experiment_listed_runs() {
     for name in [
         "td-table1",
         "td-table2",
+        "td-table4",
         "td-gains",
+        "ap-table1",
+        "ap-escort",
         "fd-table1",
         "fd-table5",
         "tg-shapes",

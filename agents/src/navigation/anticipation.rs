@@ -1,7 +1,7 @@
 //! Which way and how fast to go among people who walk: path-velocity decomposition with evasions.
 //! Candidate manoeuvres are rolled forward with the robot's own control law against people who
 //! walk on as they do now, and the one is taken that intrudes least on their spaces for the time it
-//! takes. This file guarantees that waiting cannot last forever: time weighs more the more of it
+//! takes, and least on what else the grid holds dear. This file guarantees that waiting cannot last forever: time weighs more the more of it
 //! has been lost.
 //!
 //! The rates and times were chosen on the recorded pedestrians of UCY zara01 and on the scenarios
@@ -10,6 +10,7 @@
 use super::control::{Limits, Motion, Unicycle, follow};
 use super::ground::Ground;
 use super::people::{INTIMATE, PERSONAL, Person, Presence, SOCIAL};
+use crate::grid::{CostGrid, FREE};
 use nalgebra::{Point2, Rotation2, Vector2, distance, distance_squared};
 use std::f64::consts::TAU;
 
@@ -35,6 +36,10 @@ const BORDER: f64 = 2.4;
 const STANDING_BORDER: f64 = 1.7;
 /// What a second at the inner edge of social space costs.
 const SOCIAL_RATE: f64 = 0.2;
+/// A cell that costs more than social space is in somebody's or some object's space; a blocked one counts
+/// as the dearest that is not (READING.md item 7): obstacles have their own rule.
+const SOCIAL_COST: f32 = 2.0;
+const DEAREST: f32 = 4.0;
 /// How fast a prediction loses weight, seconds.
 const TRUST: f64 = 10.0;
 /// After so many lost seconds time weighs double.
@@ -73,11 +78,14 @@ pub struct Scene<'a> {
     pub people: &'a [Person],
     /// Where the robot cannot be for other reasons.
     pub ground: &'a Ground,
+    /// What places cost that the line was planned on; without it, a place costs nothing but people.
+    pub grid: Option<&'a CostGrid>,
     /// What the base can do.
     pub limits: &'a Limits,
     /// The time that the robot has lost, seconds.
     pub lost: f64,
-    /// Whom the robot is on its way to talk to: it may come up to the border of their space.
+    /// Whom the robot is on its way to talk to: it may come up to the border of their space, and ahead
+    /// of them, where they want it, to that of the intimate one.
     pub addressee: Option<&'a str>,
 }
 
@@ -86,6 +94,8 @@ pub struct Scene<'a> {
 struct Seen {
     presence: Presence,
     border: f64,
+    /// Whether the person wants the robot ahead of them.
+    wanted: bool,
 }
 
 /// The manoeuvre taken.
@@ -156,6 +166,7 @@ impl Anticipation {
         let seen = |person: &Person, time: f64| Seen {
             presence: person.predicted(time),
             border: border(person, scene),
+            wanted: scene.addressee == Some(&person.name),
         };
         let people = || scene.people.iter().filter(near);
         self.standing.clear();
@@ -173,7 +184,7 @@ impl Anticipation {
         for k in (1..scene.line.len()).rev() {
             let (length, cost) = self.to_end[k];
             let step = distance(&scene.line[k - 1], &scene.line[k]);
-            let rate = intrusion(scene.line[k - 1], &self.standing, scene.limits.radius);
+            let rate = self.standing_rate(scene.line[k - 1], scene);
             self.to_end[k - 1] = (length + step, cost + rate * step / pace(scene));
         }
     }
@@ -204,7 +215,7 @@ impl Anticipation {
             let radius = scene.limits.radius;
             let met = (-time / TRUST).exp() * intrusion(robot.position, walking, radius);
             // Who stands will still stand there later: putting it off gains nothing.
-            cost += STEP * met.max(intrusion(robot.position, &self.standing, radius));
+            cost += STEP * met.max(self.standing_rate(robot.position, scene));
             if cost >= limit {
                 return cost;
             }
@@ -220,11 +231,16 @@ impl Anticipation {
         cost + self.remaining(robot.position, rollout.next, scene)
     }
 
+    /// What a second at `place` costs for those who stand, and for what is in use there.
+    fn standing_rate(&self, place: Point2<f64>, scene: &Scene) -> f64 {
+        let people = intrusion(place, &self.standing, scene.limits.radius);
+        people.max(scene.grid.map_or(0.0, |grid| dearness(place, grid)))
+    }
+
     /// What it costs to get from `place` to the goal: straight to a point of the line within a few
     /// metres on from point `next`, and then along the line; the least over those points.
     fn remaining(&self, place: Point2<f64>, next: usize, scene: &Scene) -> f64 {
         let second = (1.0 + scene.lost / PATIENCE) / scene.limits.max_speed.max(0.05);
-        let radius = scene.limits.radius;
         let through = |join: usize| {
             let way = scene.line[join] - place;
             let length = way.norm();
@@ -237,7 +253,7 @@ impl Anticipation {
                 } else {
                     hidden
                 };
-                spaces += intrusion(at, &self.standing, radius);
+                spaces += self.standing_rate(at, scene);
             }
             let (rest, cost) = self.to_end[join];
             let spaces = cost + spaces * length / pieces as f64 / pace(scene);
@@ -270,15 +286,36 @@ fn border(person: &Person, scene: &Scene) -> f64 {
     }
 }
 
+/// What a second at `place` costs by the grid, beyond the time: as much more as the path planner holds a
+/// metre there dearer. Social space and less is left to where people are.
+fn dearness(place: Point2<f64>, grid: &CostGrid) -> f64 {
+    let cost = grid.cell_at(place).map_or(FREE, |cell| grid.cost(cell));
+    if cost > SOCIAL_COST {
+        f64::from(cost.min(DEAREST) - FREE)
+    } else {
+        0.0
+    }
+}
+
 /// What a second at `place` costs while `seen` are there: the closest zone counts.
 fn intrusion(place: Point2<f64>, seen: &[Seen], radius: f64) -> f64 {
     let mut worst: f64 = 0.0;
-    for Seen { presence, border } in seen {
+    for Seen {
+        presence,
+        border,
+        wanted,
+    } in seen
+    {
         let squared = distance_squared(&presence.position, &place);
         if squared > 6.0 {
             continue;
         }
         let q = presence.squared_deviation(place);
+        let q = if *wanted && q >= INTIMATE && presence.wants_at(place) {
+            SOCIAL
+        } else {
+            q
+        };
         let mut rate = if q < INTIMATE {
             INTIMATE_RATE
         } else if q < PERSONAL {

@@ -12,6 +12,7 @@ mod drive;
 mod replan;
 
 use self::course::Course;
+use self::replan::person_of;
 use super::anticipation::Anticipation;
 use super::band::{Band, Gains};
 use super::control::{Guard, Limits, Motion, Unicycle, turn_to, wrapped};
@@ -21,7 +22,7 @@ use super::path::PathError;
 use super::people::{Person, Presence};
 use super::planner::Planner;
 use super::settled::Settled;
-use super::target::{INSIDE, Target, Task, has_moved};
+use super::target::{INSIDE, Region, Target, Task, has_moved};
 use crate::grid::CostGrid;
 use crate::messages::{LaserScan, Odometry, VelocityCommand};
 use dsr::Time;
@@ -167,6 +168,9 @@ struct View<'a> {
     robot: Unicycle,
     scan: &'a LaserScan,
     inputs: &'a Inputs<'a>,
+    /// The people known but for whom the robot keeps company: where that one will be depends on both,
+    /// and what the laser sees keeps the two apart.
+    others: &'a [Person],
 }
 
 /// A wanted motion, and how the task stands with it.
@@ -198,7 +202,23 @@ impl Navigator {
 
     /// One step.
     pub fn step(&mut self, now: Time, inputs: &Inputs) -> Output {
-        let (motion, status) = match self.view(now, inputs) {
+        let companion = inputs
+            .task
+            .filter(|task| task.target.is_company())
+            .and_then(|task| task.target.person());
+        let others: Vec<Person> = match companion {
+            Some(name) => {
+                let others = inputs.people.iter().filter(|person| person.name != name);
+                others.cloned().collect()
+            }
+            None => Vec::new(),
+        };
+        let others = if companion.is_some() {
+            &others
+        } else {
+            inputs.people
+        };
+        let (motion, status) = match self.view(now, inputs, others) {
             Err(cause) => (STAND, Status::Waiting(cause)),
             Ok(view) => {
                 let (wanted, status) = self.decide(&view);
@@ -234,7 +254,7 @@ impl Navigator {
     pub fn face(&mut self, now: Time, inputs: &Inputs, place: Option<Point2<f64>>) -> Output {
         self.course = None;
         self.band = Band::default();
-        let wanted = self.view(now, inputs).map(|view| {
+        let wanted = self.view(now, inputs, inputs.people).map(|view| {
             let turn = place.map_or(STAND, |place| {
                 let way = place - view.robot.position;
                 turn_to(
@@ -259,7 +279,12 @@ impl Navigator {
     }
 
     /// What the robot sees, or what is missing for it to move at all.
-    fn view<'a>(&self, now: Time, inputs: &'a Inputs<'a>) -> Result<View<'a>, Cause> {
+    fn view<'a>(
+        &self,
+        now: Time,
+        inputs: &'a Inputs<'a>,
+        others: &'a [Person],
+    ) -> Result<View<'a>, Cause> {
         let fresh = |time: Time| now.since(time) <= self.config.patience;
         let odometry = inputs
             .odometry
@@ -286,6 +311,7 @@ impl Navigator {
             robot,
             scan,
             inputs,
+            others,
         })
     }
 
@@ -369,8 +395,7 @@ impl Navigator {
             .advanced(view.robot.motion, since)
             .world_from_robot();
         let walkers: Vec<Presence> = view
-            .inputs
-            .people
+            .others
             .iter()
             .filter(|person| view.inputs.social && person.is_walking())
             .map(|person| person.predicted(0.0))
@@ -401,12 +426,11 @@ impl Navigator {
                 .then_some((STAND, Status::Arrived));
         }
         let destination = course.destination?;
-        if let Target::Person { name, .. } = &course.task.target {
-            let person = view
-                .inputs
-                .people
-                .iter()
-                .find(|person| person.name == *name)?;
+        if course.task.target.person().is_some() {
+            let person = person_of(&course.task, view.inputs.people)?;
+            if let Target::Company { until, .. } = &course.task.target {
+                return self.company(course, view, person, until.as_deref());
+            }
             if has_moved(course.person, person.position()) {
                 return None;
             }
@@ -422,6 +446,30 @@ impl Navigator {
         }
         let turn = turn_to(&view.robot, heading, 0.5 * self.config.heading_tolerance);
         Some((turn, Status::Moving))
+    }
+
+    /// Whether the way together is at its end, or the companion stands and the robot beside them.
+    fn company(
+        &self,
+        course: &Course,
+        view: &View,
+        person: &Person,
+        until: Option<&[Point2<f64>]>,
+    ) -> Option<Decision> {
+        if let Some(outline) = until {
+            let end = Region::new(outline);
+            if end.depth(view.robot.position) > INSIDE && end.depth(person.position()) > INSIDE {
+                return Some((STAND, Status::Arrived));
+            }
+        }
+        let destination = course.destination?;
+        let gap = distance(&view.robot.position, &destination.point);
+        if person.is_walking() || gap > 2.0 * self.config.goal_tolerance {
+            return None;
+        }
+        let heading = destination.heading.unwrap_or(view.robot.heading);
+        let turn = turn_to(&view.robot, heading, self.config.heading_tolerance);
+        Some((turn, Status::Waiting(Cause::People)))
     }
 }
 

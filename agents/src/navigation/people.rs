@@ -1,7 +1,7 @@
 //! The people around the robot, where they will be, and how deep a place lies in their space.
 //! This file guarantees that a place's zone is exactly the one that the metrics count it to.
 
-use crate::social_mapping::AsymmetricGaussian;
+use crate::social_mapping::{AsymmetricGaussian, CooperationZone};
 use nalgebra::{Isometry2, Point2, Vector2};
 
 /// The shape of every personal space.
@@ -86,6 +86,11 @@ impl Presence {
         };
         let left = Vector2::new(-self.facing.y, self.facing.x);
         self.facing * (place.x / along.powi(2)) + left * (place.y / SPACE.side.powi(2))
+    }
+
+    /// Whether `place` lies where the person wants a robot that comes to talk (AP 2.2).
+    pub fn wants_at(&self, place: Point2<f64>) -> bool {
+        CooperationZone::AHEAD.contains(self.own_frame(place))
     }
 
     /// `place` as the person sees it: x ahead, y to the left.

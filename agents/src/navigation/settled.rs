@@ -1,7 +1,8 @@
 //! The social grid without the spaces of those who walk: they will be elsewhere when the robot gets
 //! there, and a path planned round where they are now would swing about with them. Where they will
-//! be is the planner's and the anticipation's business. This file guarantees that a cell outside
-//! walkers' spaces costs what the newest grid says.
+//! be is the planner's and the anticipation's business. Beside the spaces that stay, a berth is kept.
+//! This file guarantees that a cell outside walkers' spaces costs at least what the newest grid says,
+//! and more only within [`BERTH`] of a dearer space.
 
 use super::people::{INTIMATE, Person, SOCIAL};
 use crate::grid::{BLOCKED, CostGrid, FREE};
@@ -17,10 +18,21 @@ const PERIOD: f64 = 0.25;
 /// What a space can cost at most without being blocked (READING.md item 7).
 const DEAREST_SPACE: f32 = 4.0;
 
+/// So far from a space the cells are dearer than their own cost, metres: the cheapest path around a
+/// space would else lead along its very edge, and a robot that cuts a curve or errs about where it is
+/// by some centimetres drives inside it.
+const BERTH: f64 = 0.15;
+/// What a cell in the berth costs, as a share of what the space costs more than a free cell.
+const BERTH_SHARE: f32 = 0.8;
+/// From this cost on a cell is one of a space rather than one beside a wall (READING.md item 7).
+const LEAST_SPACE: f32 = 1.5;
+
 /// What the grid said of each cell when nobody last walked there.
 #[derive(Debug, Clone)]
 pub(super) struct Settled {
     grid: CostGrid,
+    /// The same with the berth.
+    kept_off: CostGrid,
     looked: Option<Time>,
     hidden: Vec<bool>,
 }
@@ -29,6 +41,7 @@ impl Default for Settled {
     fn default() -> Self {
         Self {
             grid: CostGrid::covering([0.0; 4], 1.0),
+            kept_off: CostGrid::covering([0.0; 4], 1.0),
             looked: None,
             hidden: Vec::new(),
         }
@@ -36,9 +49,9 @@ impl Default for Settled {
 }
 
 impl Settled {
-    /// The grid without walkers.
+    /// The grid without walkers and with the berth.
     pub(super) fn grid(&self) -> &CostGrid {
-        &self.grid
+        &self.kept_off
     }
 
     /// Takes in `newest`, with `people` where they are now. A cell that has never been seen without
@@ -66,6 +79,7 @@ impl Settled {
             for ((new, _), cost) in seen.filter(|((_, hidden), _)| !**hidden) {
                 *cost = *new;
             }
+            self.keep_off();
             return;
         }
         self.grid = newest.clone();
@@ -77,6 +91,35 @@ impl Settled {
             .filter(|(_, hidden)| **hidden)
         {
             *cost = FREE;
+        }
+        self.keep_off();
+    }
+
+    /// Makes dearer what lies beside a space.
+    fn keep_off(&mut self) {
+        let CostGrid { width, height, .. } = self.grid;
+        let resolution = self.grid.resolution;
+        let mut costs = std::mem::take(&mut self.kept_off.costs);
+        costs.clone_from(&self.grid.costs);
+        self.kept_off = CostGrid { costs, ..self.grid };
+        // Rounding takes no cell away.
+        let reach = BERTH / resolution + 1e-9;
+        let (cells, reach) = (reach as usize, reach.powi(2));
+        for (index, &cost) in self.grid.costs.iter().enumerate() {
+            if !(LEAST_SPACE..BLOCKED).contains(&cost) {
+                continue;
+            }
+            let (column, row) = (index % width, index / width);
+            let dearer = FREE + BERTH_SHARE * (cost - FREE);
+            for y in row.saturating_sub(cells)..(row + cells + 1).min(height) {
+                for x in column.saturating_sub(cells)..(column + cells + 1).min(width) {
+                    let squared = x.abs_diff(column).pow(2) + y.abs_diff(row).pow(2);
+                    let beside = &mut self.kept_off.costs[y * width + x];
+                    if squared as f64 <= reach && *beside < dearer {
+                        *beside = dearer;
+                    }
+                }
+            }
         }
     }
 
@@ -165,5 +208,32 @@ mod tests {
         let person = walker(x, 0.0);
         settled.observe(now, &grid(&person), &[person]);
         assert!(at(&settled, x) >= BLOCKED && at(&settled, x + 1.0) >= 2.0);
+    }
+
+    #[test]
+    fn a_berth_is_kept_beside_spaces_and_none_beside_walls() {
+        let mut grid = CostGrid::covering([0.0, 0.0, 2.0, 1.0], 0.05);
+        for k in 0..grid.costs.len() {
+            let x = grid.centre((k % grid.width, k / grid.width)).x;
+            grid.costs[k] = if x > 1.8 {
+                BLOCKED
+            } else if x > 1.0 {
+                3.5
+            } else if x < 0.2 {
+                1.4
+            } else {
+                FREE
+            };
+        }
+        let mut settled = Settled::default();
+        settled.observe(Time::from_seconds(1.0), &grid, &[]);
+        let cost = |x: f64| {
+            settled
+                .grid()
+                .cost(grid.cell_at(Point2::new(x, 0.5)).unwrap())
+        };
+        assert_eq!([cost(0.1), cost(0.3), cost(0.82)], [1.4, FREE, FREE]);
+        assert_eq!([cost(0.87), cost(0.98), cost(1.02)], [3.0, 3.0, 3.5]);
+        assert!(cost(1.9) >= BLOCKED);
     }
 }

@@ -2,8 +2,9 @@
 //! in front of a person, or the place itself. This file guarantees that a place offered in a room
 //! lies inside it, and one offered for a person lies outside their personal space.
 
-use super::people::Person;
+use super::people::{PERSONAL, Person};
 use crate::grid::CostGrid;
+use crate::social_mapping::AsymmetricGaussian;
 use geo::{Contains, Distance, Euclidean, LineString, Polygon};
 use nalgebra::{Isometry2, Point2, Rotation2, Vector2, distance};
 use std::f64::consts::{FRAC_PI_4, TAU};
@@ -26,9 +27,44 @@ pub enum Target {
     Person {
         /// The name of the person.
         name: String,
-        /// How far from the person, metres. Personal space ends 1.18 m ahead of people.
+        /// How far from the person, metres. Personal space ends 1.18 m ahead of people; nearer is
+        /// where the person wants the robot, in the cooperation zone ahead (AP 2.2).
         distance: f64,
     },
+    /// With a person who walks, for as long as it takes (AP 4.2).
+    Company {
+        /// The name of the person.
+        name: String,
+        /// At which place.
+        place: Company,
+        /// Where the way together ends, world frame: when both are well inside this region. Without
+        /// it, it ends with the task.
+        until: Option<Vec<Point2<f64>>>,
+    },
+}
+
+/// Where the robot goes that keeps somebody company.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Company {
+    /// At the person's right, else at their left; behind where neither has room, such as in a door.
+    Beside,
+    /// Behind the person.
+    Behind,
+}
+
+impl Target {
+    /// Whom the task leads to, or with whom.
+    pub fn person(&self) -> Option<&str> {
+        match self {
+            Self::Person { name, .. } | Self::Company { name, .. } => Some(name),
+            Self::Region { .. } | Self::Point(_) | Self::Pose(_) => None,
+        }
+    }
+
+    /// Whether it moves with the person.
+    pub fn is_company(&self) -> bool {
+        matches!(self, Self::Company { .. })
+    }
 }
 
 /// Something to carry out.
@@ -129,8 +165,85 @@ impl Region {
     }
 }
 
+/// From somebody who is kept company to the robot's centre beside them, metres: in the outermost part of
+/// personal space, which ends 0.88 m aside, for who comes nearer makes people step aside.
+const ASIDE: f64 = 0.86;
+/// Who still comes from behind keeps so much farther aside for each metre that is left, up to a metre: the
+/// two close in along the way and not across it.
+const WIDE: f64 = 0.4;
+/// The same behind, where personal space ends 0.59 m away.
+const BEHIND: f64 = 0.9;
+/// The robot aims at where its companion will be in so many seconds: it brakes for the end of its way.
+const AHEAD: f64 = 0.6;
+/// So many times that far ahead, there must be room beside the companion, too: falling behind takes time.
+const FALLING_BEHIND: u32 = 5;
+/// The nearest part of the way from a companion to a place that counts, metres: they may walk beside a
+/// wall themselves.
+const OWN_ROOM: f64 = 0.35;
+
+/// Where to keep `person` company, the best place first; one aside only if it is free on `grid`, and no
+/// wall lies between.
+pub fn places_with(
+    person: &Person,
+    place: Company,
+    grid: &CostGrid,
+    robot: Point2<f64>,
+) -> impl Iterator<Item = Destination> + use<> {
+    let ahead = if person.is_walking() {
+        person.velocity * AHEAD
+    } else {
+        Vector2::zeros()
+    };
+    let position = person.position() + ahead;
+    let heading = if person.is_walking() {
+        person.velocity.y.atan2(person.velocity.x)
+    } else {
+        person.world_from_person.rotation.angle()
+    };
+    let turned = Rotation2::new(heading);
+    let free_from = |position: Point2<f64>, offset: Vector2<f64>| {
+        let steps = (offset.norm() / grid.resolution).ceil().max(1.0);
+        (0..=steps as usize).all(|k| {
+            let along = offset * (k as f64 / steps);
+            let cell = grid.cell_at(position + along);
+            along.norm() < OWN_ROOM || cell.is_some_and(|cell| grid.cost(cell).is_finite())
+        })
+    };
+    // Also where the companion will be while the robot falls behind.
+    let has_room = |offset: Vector2<f64>| {
+        let later = (0..FALLING_BEHIND).map(|k| position + ahead * f64::from(k));
+        later
+            .into_iter()
+            .all(|position| grid.cell_at(position).is_none() || free_from(position, offset))
+    };
+    let left = (position - robot)
+        .dot(&(turned * Vector2::x()))
+        .clamp(0.0, 1.0);
+    let aside: Vec<Vector2<f64>> = [-1.0, 1.0]
+        .into_iter()
+        .map(|side| turned * Vector2::new(0.0, side))
+        .filter(|side| place == Company::Beside && has_room(side * ASIDE))
+        .map(|side| {
+            let wide = side * (ASIDE + WIDE * left);
+            if free_from(position, wide) {
+                wide
+            } else {
+                side * ASIDE
+            }
+        })
+        .collect();
+    // The nearest place behind that is as far along the way as the companion allows.
+    let behind = turned * Vector2::new(-BEHIND, 0.0);
+    let offsets = aside.into_iter().chain([behind]);
+    offsets.map(move |offset| Destination {
+        point: position + offset,
+        heading: Some(heading),
+    })
+}
+
 /// Where to talk to `person`: in front of them, else ever more to their side (the nearer side
-/// first), facing them.
+/// first), facing them. Within personal space only in front of them, where they want the robot; there,
+/// farther places come after the wanted one (AP 4.1).
 pub fn places_to_talk(
     person: &Person,
     far: f64,
@@ -143,17 +256,21 @@ pub fn places_to_talk(
     } else {
         -FRAC_PI_4
     };
-    [0.0, side, -side, 2.0 * side, -2.0 * side]
-        .into_iter()
-        .map(move |turn| {
-            let outward = Rotation2::new(turn) * Vector2::new(far, 0.0);
-            let point = position + facing * outward;
-            let back = position - point;
-            Destination {
-                point,
-                heading: Some(back.y.atan2(back.x)),
-            }
-        })
+    let within = far < AsymmetricGaussian::HALL.front * PERSONAL.sqrt();
+    let places = if within {
+        [0.0, 0.25, 0.5, 0.75, 1.0].map(|farther| (0.0, far + farther))
+    } else {
+        [0.0, side, -side, 2.0 * side, -2.0 * side].map(|turn| (turn, far))
+    };
+    places.into_iter().map(move |(turn, far)| {
+        let outward = Rotation2::new(turn) * Vector2::new(far, 0.0);
+        let point = position + facing * outward;
+        let back = position - point;
+        Destination {
+            point,
+            heading: Some(back.y.atan2(back.x)),
+        }
+    })
 }
 
 /// Whether two people's places, or one person's at two times, differ enough to drive elsewhere.
@@ -165,7 +282,7 @@ pub(super) fn has_moved(from: Point2<f64>, to: Point2<f64>) -> bool {
 mod tests {
     use super::*;
     use crate::grid::BLOCKED;
-    use crate::navigation::people::PERSONAL;
+    use crate::navigation::people::INTIMATE;
 
     fn room() -> Region {
         Region::new(
@@ -199,6 +316,58 @@ mod tests {
         assert!(place.x >= 4.0 && room().depth(place) >= 0.95, "{place}");
         grid.costs.fill(BLOCKED);
         assert_eq!(room().place_inside(None, &grid), None);
+    }
+
+    #[test]
+    fn company_is_kept_at_the_right_else_at_the_left_and_behind_in_a_door() {
+        let mut grid = CostGrid::covering([0.0, 0.0, 10.0, 5.0], 0.1);
+        let walker = |x: f64, y: f64| Person {
+            name: "ana".into(),
+            world_from_person: Isometry2::new(Vector2::new(x, y), 0.0),
+            velocity: Vector2::new(0.5, 0.0),
+            radius: 0.25,
+        };
+        let side = |grid: &CostGrid, person: &Person| {
+            let robot = person.position() - Vector2::new(2.0, 0.0);
+            let place = places_with(person, Company::Beside, grid, robot).next();
+            let place = person.world_from_person.inverse() * place.unwrap().point;
+            assert!(
+                person
+                    .predicted(AHEAD)
+                    .squared_deviation(person.world_from_person * place)
+                    > INTIMATE
+            );
+            (place.y * 2.0).round() as i32
+        };
+        assert_eq!(
+            side(&grid, &walker(2.0, 2.5)),
+            -3,
+            "wide on the right from behind"
+        );
+        assert_eq!(side(&grid, &walker(2.0, 0.6)), 3, "no room on the right");
+        for row in (0..20).chain(30..50) {
+            grid.costs[row * 100 + 50] = BLOCKED;
+        }
+        assert_eq!(side(&grid, &walker(4.0, 2.5)), 0, "a door is near");
+        assert_eq!(side(&grid, &walker(6.0, 2.5)), -3, "the door is behind");
+        let behind = places_with(&walker(2.0, 2.5), Company::Behind, &grid, Point2::origin());
+        assert_eq!(behind.count(), 1);
+    }
+
+    #[test]
+    fn within_personal_space_one_talks_in_front_only() {
+        let person = Person {
+            name: "ana".into(),
+            world_from_person: Isometry2::new(Vector2::new(3.0, 1.0), 0.5),
+            velocity: Vector2::zeros(),
+            radius: 0.25,
+        };
+        for place in places_to_talk(&person, 0.57, Point2::new(0.0, 9.0)) {
+            let own = person
+                .world_from_person
+                .inverse_transform_point(&place.point);
+            assert!(own.y.abs() < 1e-9 && own.x > 0.56, "{own}");
+        }
     }
 
     #[test]

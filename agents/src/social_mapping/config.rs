@@ -4,10 +4,11 @@
 use super::adaptation::WallAdaptation;
 use super::features::Features;
 use super::four_sided::FourSided;
+use super::gaussian::AsymmetricGaussian;
 use super::groups::Grouping;
 use super::object_space::{Space, UsageCurve};
 use super::personal::{self, CooperationZone, MOST_ZONES};
-use super::zones::Proxemics;
+use super::zones::{Levels, Proxemics};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -96,6 +97,34 @@ pub struct ConfigError {
 }
 
 impl SocialConfig {
+    /// Paper AP's figures: personal space is a circle of 1.2 m, intimate space one of 0.4 m (AP 1), walking
+    /// stretches it ahead (AP 2.1), and what lies outside costs as much as free space. The layers are AP's
+    /// in any case.
+    pub fn adaptive_proxemics() -> Self {
+        const PERSONAL: f64 = 1.2;
+        const INTIMATE: f64 = 0.4;
+        let level = 0.5f64;
+        let width = PERSONAL / (-2.0 * level.ln()).sqrt();
+        let intimate = (-0.5 * (INTIMATE / width).powi(2)).exp();
+        let shape = AsymmetricGaussian {
+            front: width,
+            side: width,
+            rear: width,
+        };
+        Self {
+            proxemics: Proxemics {
+                shape,
+                levels: Levels {
+                    intimate,
+                    personal: level,
+                    // Just outside of the personal zone: AP knows no further one.
+                    social: 0.999 * level,
+                },
+            },
+            ..Self::default()
+        }
+    }
+
     /// Everything that is wrong with the figures.
     pub fn problems(&self) -> Vec<ConfigError> {
         let not_negative = |x: f64| x.is_finite() && x >= 0.0;
@@ -195,6 +224,17 @@ impl SocialConfig {
 mod tests {
     use super::*;
     use crate::social_mapping::map::SocialMapper;
+
+    #[test]
+    fn adaptive_proxemics_has_its_zones_at_the_papers_distances() {
+        let config = SocialConfig::adaptive_proxemics();
+        assert!(config.problems().is_empty());
+        let Proxemics { shape, levels } = config.proxemics;
+        for (far, level) in [(0.4, levels.intimate), (1.2, levels.personal)] {
+            let density = (-0.5 * (far / shape.side).powi(2)).exp();
+            assert!((density - level).abs() < 1e-12);
+        }
+    }
 
     #[test]
     fn figures_that_make_no_map_are_all_named() {

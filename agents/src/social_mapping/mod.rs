@@ -36,5 +36,6 @@ pub use graph::{SocialMapping, Turn};
 pub use layers::Layer;
 pub use map::{ObjectUse, PersonSpaces, SocialMapper, Update};
 pub use object_space::{Agenda, Outline, Space, UsageCurve};
+pub use personal::CooperationZone;
 pub use scene::{Rejection, SceneError, SocialScene};
 pub use zones::{Levels, Proxemics, Zone, zone_at};

@@ -23,6 +23,13 @@ pub struct CooperationZone {
 }
 
 impl CooperationZone {
+    /// Where somebody wants the robot that comes to talk: a third of a half turn ahead. AP leaves the
+    /// opening to whoever configures.
+    pub const AHEAD: Self = Self {
+        direction: 0.0,
+        opening: FRAC_PI_3,
+    };
+
     /// Whether a place in the person's own frame lies in the sector.
     pub fn contains(&self, place: Point2<f64>) -> bool {
         let off = place.y.atan2(place.x) - self.direction;
@@ -59,7 +66,7 @@ pub(super) fn cooperation() -> BTreeMap<String, Vec<CooperationZone>> {
         opening: FRAC_PI_3,
     };
     [
-        ("approach", vec![zone(0.0)]),
+        ("approach", vec![CooperationZone::AHEAD]),
         ("escort", vec![zone(FRAC_PI_2), zone(-FRAC_PI_2)]),
         ("follow", vec![zone(PI)]),
     ]

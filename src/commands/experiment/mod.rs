@@ -37,6 +37,11 @@ const EXPERIMENTS: &[Experiment] = &[
         run: drives::table2,
     },
     Experiment {
+        name: "td-table4",
+        about: "a therapist at the television of a living room (TD Table 4)",
+        run: drives::table4,
+    },
+    Experiment {
         name: "td-gains",
         about: "the search for the gains of the elastic band (TD 5.4)",
         run: drives::gains,
@@ -80,6 +85,16 @@ const EXPERIMENTS: &[Experiment] = &[
         name: "tg-groups",
         about: "groups by triangulation, and a group's own space (TG Figs 11, 12 and 15)",
         run: |_| social_groups::groups(),
+    },
+    Experiment {
+        name: "ap-table1",
+        about: "approaching somebody from ahead and going home, over and over (AP Table 1)",
+        run: drives::approaches,
+    },
+    Experiment {
+        name: "ap-escort",
+        about: "escorting somebody through a door (AP Fig. 9)",
+        run: drives::escort,
     },
 ];
 
@@ -155,6 +170,13 @@ mod tests {
                 assert!(
                     row.agrees() || row.note.is_some(),
                     "{}: {} differs and nothing says why",
+                    one.name,
+                    row.label
+                );
+                let driven = one.name.starts_with("td-") || one.name.starts_with("ap-");
+                assert!(
+                    !driven || row.claims_hold(),
+                    "{}: {} is not as the paper says",
                     one.name,
                     row.label
                 );

@@ -160,6 +160,13 @@ impl Row {
     pub(super) fn agrees(&self) -> bool {
         self.cells.iter().all(Cell::agrees)
     }
+
+    /// Whether all that is claimed in words holds, whatever the figures are.
+    #[cfg(test)]
+    pub(super) fn claims_hold(&self) -> bool {
+        let in_words = |cell: &&Cell| matches!(cell.ours, Figure::Text(_));
+        self.cells.iter().filter(in_words).all(Cell::agrees)
+    }
 }
 
 impl Table {

@@ -41,6 +41,7 @@ fn carry_out(mut people: Vec<Person>, line: &[Point2<f64>], seconds: f64) -> (f6
             ground: &ground,
             limits: &LIMITS,
             lost: step as f64 * 0.1,
+            grid: None,
             addressee: None,
         };
         let choice = anticipation.choose(&robot, &scene);
@@ -74,6 +75,7 @@ fn with_nobody_near_the_line_is_followed_at_top_speed() {
         ground: &ground,
         limits: &LIMITS,
         lost: 0.0,
+        grid: None,
         addressee: None,
     };
     let choice = Anticipation::default().choose(&robot, &scene);

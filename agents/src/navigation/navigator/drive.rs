@@ -7,21 +7,18 @@ use super::{Cause, Decision, Failure, Navigator, STAND, Status, View};
 use crate::grid::CostGrid;
 use crate::navigation::anticipation::{Manoeuvre, Scene};
 use crate::navigation::band::{BandState, Surroundings};
-use crate::navigation::control::{Motion, follow};
+use crate::navigation::control::{Motion, follow, turn_to};
 use crate::navigation::people::Person;
-use crate::navigation::target::Target;
 
+/// A companion that is farther away than this from where they should be is gone another way, metres.
+const CATCHING_UP: f64 = 2.0;
 /// The headway that the robot makes in a second at top speed makes up for so many lost seconds.
 const HEADWAY_WORTH: f64 = 3.0;
 
 impl Navigator {
     /// Lets the band move.
     pub(super) fn relax(&mut self, grid: &CostGrid, view: &View, iterations: usize) -> BandState {
-        let people = if view.inputs.social {
-            view.inputs.people
-        } else {
-            &[]
-        };
+        let people = if view.inputs.social { view.others } else { &[] };
         let limits = &view.inputs.limits;
         let around = Surroundings {
             obstacles: &self.obstacles,
@@ -40,6 +37,9 @@ impl Navigator {
             .planned
             .map_or(0.0, |planned| view.now.since(planned));
         let waited = self.count_headway(course, view);
+        let company = course.task.target.is_company();
+        // The way that is left is as long as the companion makes it.
+        let waited = if company { 0.0 } else { waited };
         if waited > self.config.give_up_after {
             return (STAND, Status::Failed(Failure::Stuck));
         }
@@ -58,6 +58,9 @@ impl Navigator {
             // Without a new way the old one is as good as any.
             course.hindrance = self.plan(course, grid, view, person, Care::Laser).err();
         }
+        if company && let Some(turn) = falls_back(course, view) {
+            return (turn, Status::Waiting(Cause::People));
+        }
         let limits = &view.inputs.limits;
         let line = self.band.points();
         if !view.inputs.social {
@@ -67,16 +70,14 @@ impl Navigator {
         }
         self.ground
             .load(view.robot.position, &self.obstacles, limits.radius);
-        let addressee = match &course.task.target {
-            Target::Person { name, .. } => Some(name.as_str()),
-            _ => None,
-        };
+        let addressee = course.task.target.person();
         let scene = Scene {
             line,
-            people: view.inputs.people,
+            people: view.others,
             ground: &self.ground,
+            grid: Some(grid),
             limits,
-            lost: course.lost,
+            lost: if company { 0.0 } else { course.lost },
             addressee,
         };
         let choice = self.anticipation.choose(&view.robot, &scene);
@@ -126,4 +127,15 @@ impl Navigator {
             }
         }
     }
+}
+
+/// What a robot does that is further on than its place with a companion: it lets them catch up, and does
+/// not turn back.
+fn falls_back(course: &Course, view: &View) -> Option<Motion> {
+    let destination = course.destination?;
+    let heading = destination.heading?;
+    let way = destination.point - view.robot.position;
+    let ahead = way.x * heading.cos() + way.y * heading.sin();
+    let near = way.norm() < CATCHING_UP;
+    (near && ahead < 0.0).then(|| turn_to(&view.robot, heading, 0.1))
 }

@@ -7,7 +7,9 @@ use crate::grid::CostGrid;
 use crate::navigation::band::Band;
 use crate::navigation::people::{Person, Presence};
 use crate::navigation::planner::price;
-use crate::navigation::target::{Destination, Target, Task, has_moved, places_to_talk};
+use crate::navigation::target::{
+    Destination, Target, Task, has_moved, places_to_talk, places_with,
+};
 use nalgebra::Point2;
 
 impl Navigator {
@@ -18,26 +20,23 @@ impl Navigator {
         grid: &CostGrid,
         view: &View,
     ) -> Result<(), Hindrance> {
-        let person = match &course.task.target {
-            Target::Person { name, .. } => {
-                let found = view
-                    .inputs
-                    .people
-                    .iter()
-                    .find(|person| person.name == *name);
-                Some(found.ok_or(Hindrance::NoPerson)?)
-            }
-            _ => None,
-        };
+        let person = person_of(&course.task, view.inputs.people);
+        if person.is_none() && course.task.target.person().is_some() {
+            return Err(Hindrance::NoPerson);
+        }
         let age = course
             .planned
             .map_or(f64::INFINITY, |planned| view.now.since(planned));
-        if age < 0.5 {
+        let company = course.task.target.is_company();
+        if age < if company { 0.3 } else { 0.5 } {
             return course.hindrance.map_or(Ok(()), Err);
         }
         let moved = person.is_some_and(|person| has_moved(course.person, person.position()));
         let now = price(grid, self.band.points());
         course.price = course.price.min(now.cost);
+        if company {
+            return self.plan(course, grid, view, person, Care::Map);
+        }
         let dearer = now.blocked || now.cost > 1.3 * course.price + 1.5;
         if self.band.points().is_empty() || moved || dearer || course.hindrance.is_some() {
             return self.plan(course, grid, view, person, Care::Map);
@@ -78,12 +77,11 @@ impl Navigator {
         self.planner.load(grid);
         if view.inputs.social {
             self.planner
-                .expect(view.inputs.people, robot, view.inputs.limits.max_speed);
+                .expect(view.others, robot, view.inputs.limits.max_speed);
         }
         if care == Care::Laser {
             let standing: Vec<Presence> = view
-                .inputs
-                .people
+                .others
                 .iter()
                 .filter(|person| view.inputs.social && !person.is_walking())
                 .map(|person| person.predicted(0.0))
@@ -160,7 +158,14 @@ impl Navigator {
             (Target::Pose(pose), _) => {
                 single(pose.translation.vector.into(), Some(pose.rotation.angle()))
             }
-            (Target::Person { .. }, None) => return Err(Hindrance::NoPerson),
+            (Target::Person { .. } | Target::Company { .. }, None) => {
+                return Err(Hindrance::NoPerson);
+            }
+            (Target::Company { place, .. }, Some(person)) => {
+                places_with(person, *place, grid, robot)
+                    .map(|place| (place, 0.15))
+                    .collect()
+            }
             (Target::Person { distance, .. }, Some(person)) => {
                 places_to_talk(person, *distance, robot)
                     .map(|place| (place, 0.15))
@@ -180,8 +185,6 @@ impl Navigator {
 
 /// Whom a task leads to, where they are known.
 pub(super) fn person_of<'a>(task: &Task, people: &'a [Person]) -> Option<&'a Person> {
-    match &task.target {
-        Target::Person { name, .. } => people.iter().find(|person| person.name == *name),
-        _ => None,
-    }
+    let name = task.target.person()?;
+    people.iter().find(|person| person.name == name)
 }

@@ -7,6 +7,7 @@ use crate::bench::Chance;
 use crate::commands::experiment::table::{Cell, Row, Table};
 use agents::navigation::band::Gains;
 use agents::navigation::navigator::Config;
+use agents::navigation::target::Target;
 use nalgebra::Point2;
 use scenarios::Scenario;
 use scenarios::metrics::measure;
@@ -76,7 +77,7 @@ impl Course {
             scenario: &self.scenario,
             seed: target as u64 + 1,
             social: false,
-            goal: self.targets[target],
+            targets: vec![Target::Point(self.targets[target])],
             navigation: Config {
                 gains,
                 ..Config::default()

@@ -1,12 +1,14 @@
-//! Paper TD's Tables 1 and 2, driven again: the robot among people at their activities, with and without
-//! social behaviour. The geometry of each scene is set so that the way without social behaviour is as long as
+//! Paper TD's Tables 1, 2 and 4, and paper AP's approaches and escort, driven again: the robot among people,
+//! with and without social behaviour. The geometry of each scene is set so that the way without social behaviour is as long as
 //! printed; everything else follows from planning and control.
 
+mod company;
 mod gains;
 mod tables;
 
+pub(super) use company::{approaches, escort};
 pub(super) use gains::gains;
-pub(super) use tables::{table1, table2};
+pub(super) use tables::{table1, table2, table4};
 
 use crate::Failure;
 use scenarios::Scenario;
