@@ -9,9 +9,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 const TICK: f64 = 0.05;
-const SHIPPED: [&str; 7] = [
+const SHIPPED: [&str; 8] = [
     "apartment",
     "care-centre",
+    "company",
     "corridor",
     "flat",
     "home",

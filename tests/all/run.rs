@@ -52,6 +52,43 @@ fn the_same_seed_gives_the_same_report_byte_for_byte() {
 }
 
 #[test]
+fn all_that_the_robot_does_with_people_is_planned_and_done() {
+    let arguments = [
+        "scenarios/company",
+        "--lockstep",
+        "--seed",
+        "1",
+        "--no-baseline",
+    ];
+    let folder = Run::new("company", &arguments).succeed();
+    let (_, report) = report(folder.path());
+    assert_eq!(report["success"], true);
+    assert_eq!(report["robot"]["collisions"], 0);
+    let done: Vec<(&str, &str)> = report["plan"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|step| step["status"] == "done")
+        .map(|step| {
+            (
+                step["mission"].as_str().unwrap(),
+                step["rule"].as_str().unwrap(),
+            )
+        })
+        .collect();
+    for step in [
+        ("greet", "approach"),
+        ("greet", "askForPermission"),
+        ("bring", "escort"),
+        ("pass", "letPass"),
+        ("lead", "follow"),
+        ("meet", "wait"),
+    ] {
+        assert!(done.contains(&step), "{step:?} is not among {done:?}");
+    }
+}
+
+#[test]
 fn the_care_centre_is_crossed_and_reported_beside_the_run_without_social_behaviour() {
     let run = Run::new("care", &[CARE_CENTRE, "--lockstep", "--seed", "1"]);
     let folder = run.succeed();

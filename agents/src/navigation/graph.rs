@@ -2,14 +2,15 @@
 //! it, and tells where the robot is. This file guarantees that all it must remember stands in the
 //! graph: a navigation that is started anew goes on with the step that runs.
 
+mod people;
 mod read;
 
 pub use self::read::{AGENT, StepError, TALKING_DISTANCE};
 
 use self::read::{Step, Work, World};
 use super::control::wrapped;
-use super::navigator::{Config, Failure, Inputs, Navigator, Output, Status};
-use super::target::{INSIDE, Region, Task};
+use super::navigator::{Config, Inputs, Navigator, Output, Status};
+use super::target::{INSIDE, Region, Target, Task};
 use crate::grid::CostGrid;
 use crate::messages::{LaserScan, Odometry, Speech, VelocityCommand};
 use dsr::{
@@ -17,7 +18,6 @@ use dsr::{
     Transaction, Value, planar_pose,
 };
 use nalgebra::Point2;
-use std::f64::consts::FRAC_PI_4;
 
 /// The robot's pose is written when it differs from the graph's by more than this, metres ...
 const MOVED: f64 = 0.01;
@@ -27,12 +27,6 @@ const TURNED: f64 = std::f64::consts::PI / 180.0;
 const CHANGED: f64 = 0.02;
 /// Its path, by more than this, metres, and not more often than so, seconds.
 const BENT: (f64, f64) = (0.05, 0.25);
-/// What the robot says to be looked at, and how often, seconds.
-const REQUEST: (&str, f64) = ("Excuse me, may I have a moment?", 3.0);
-/// For how long it asks, seconds.
-const ASKING: f64 = 60.0;
-/// A person faces the robot when it lies within this of where they look, radians.
-const FACING: f64 = FRAC_PI_4;
 /// A rule that the store did not apply is submitted again after this, seconds, and given up after
 /// the second figure.
 const RETRY: (f64, f64) = (1.0, 5.0);
@@ -83,6 +77,8 @@ struct Attempt {
     running: bool,
     began: Time,
     asked: Option<Time>,
+    /// Where the robot stands aside.
+    aside: Option<Point2<f64>>,
     /// When its end was first and last submitted.
     ended: Option<(Time, Time)>,
 }
@@ -176,6 +172,7 @@ impl Navigation {
                 running: false,
                 began: now,
                 asked: None,
+                aside: None,
                 ended: None,
             });
         }
@@ -193,66 +190,34 @@ impl Navigation {
         speech: &mut Option<Speech>,
     ) -> (Output, Progress) {
         match work {
-            Work::Drive(target) => {
-                let id = self
-                    .attempt
-                    .as_ref()
-                    .map_or_else(String::new, |a| a.task.clone());
-                let task = Task {
-                    id,
-                    target: target.clone(),
-                };
-                let output = self
-                    .navigator
-                    .step(now, &inputs(messages, world, Some(&task)));
-                let progress = match output.status {
-                    Status::Arrived => Progress::Done,
-                    Status::Failed(failure) => Progress::Failed(failure.to_string()),
-                    _ => Progress::UnderWay,
-                };
-                (output, progress)
-            }
-            Work::TakeAttention(name) => {
-                let person = world.people.iter().find(|person| person.name == *name);
-                let toward = person.map(super::people::Person::position);
-                let inputs = inputs(messages, world, None);
-                let output = self.navigator.face(now, &inputs, toward);
-                let robot = messages
-                    .odometry
-                    .map(|o| Point2::from(o.world_from_robot.translation.vector));
-                let (Some(attempt), Some(robot)) = (&mut self.attempt, robot) else {
-                    return (output, Progress::UnderWay);
-                };
-                if now.since(attempt.began) > ASKING {
-                    let failure = person.map_or_else(
-                        || Failure::PersonUnseen.to_string(),
-                        |person| format!("{} did not turn to the robot", person.name),
-                    );
-                    return (output, Progress::Failed(failure));
-                }
-                let Some(person) = person else {
-                    return (output, Progress::UnderWay);
-                };
-                let way = robot - person.position();
-                let heading = person.world_from_person.rotation.angle();
-                if wrapped(way.y.atan2(way.x) - heading).abs() <= FACING {
-                    return (output, Progress::Done);
-                }
-                if attempt
-                    .asked
-                    .is_none_or(|asked| now.since(asked) >= REQUEST.1)
-                {
-                    attempt.asked = Some(now);
-                    let text = REQUEST.0.to_owned();
-                    *speech = Some(Speech {
-                        time: now,
-                        toward: person.position(),
-                        text,
-                    });
-                }
-                (output, Progress::UnderWay)
-            }
+            Work::Drive(target) => self.drive(target, now, messages, world),
+            Work::Ask { person, words } => self.ask((person, words), now, messages, world, speech),
+            Work::Wait(name) => self.wait(name, now, messages, world),
+            Work::LetPass(name) => self.let_pass(name, now, messages, world),
         }
+    }
+
+    /// Takes the robot to a target.
+    fn drive(
+        &mut self,
+        target: &Target,
+        now: Time,
+        messages: &Messages,
+        world: &World,
+    ) -> (Output, Progress) {
+        let attempt = self.attempt.as_ref();
+        let task = Task {
+            id: attempt.map_or_else(String::new, |attempt| attempt.task.clone()),
+            target: target.clone(),
+        };
+        let inputs = inputs(messages, world, Some(&task));
+        let output = self.navigator.step(now, &inputs);
+        let progress = match output.status {
+            Status::Arrived => Progress::Done,
+            Status::Failed(failure) => Progress::Failed(failure.to_string()),
+            _ => Progress::UnderWay,
+        };
+        (output, progress)
     }
 
     /// Tells the graph how the step ended: the rule is applied and the step done in one
@@ -354,7 +319,8 @@ impl Navigation {
         now: Time,
     ) -> Option<Transaction> {
         let place = Point2::from(messages.odometry?.world_from_robot.translation.vector);
-        let explained = step.is_some_and(|step| step.rule == "changeRoom");
+        let explained = step
+            .is_some_and(|step| matches!(step.rule.as_str(), "changeRoom" | "escort" | "follow"));
         let there = |room: &&read::Room| {
             room.polygon.len() >= 3 && Region::new(&room.polygon).depth(place) > INSIDE
         };

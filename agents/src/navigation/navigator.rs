@@ -22,7 +22,7 @@ use super::path::PathError;
 use super::people::{Person, Presence};
 use super::planner::Planner;
 use super::settled::Settled;
-use super::target::{INSIDE, Region, Target, Task, has_moved};
+use super::target::{End, INSIDE, Target, Task, has_moved};
 use crate::grid::CostGrid;
 use crate::messages::{LaserScan, Odometry, VelocityCommand};
 use dsr::Time;
@@ -429,7 +429,7 @@ impl Navigator {
         if course.task.target.person().is_some() {
             let person = person_of(&course.task, view.inputs.people)?;
             if let Target::Company { until, .. } = &course.task.target {
-                return self.company(course, view, person, until.as_deref());
+                return self.company(course, view, person, until.as_ref());
             }
             if has_moved(course.person, person.position()) {
                 return None;
@@ -454,13 +454,10 @@ impl Navigator {
         course: &Course,
         view: &View,
         person: &Person,
-        until: Option<&[Point2<f64>]>,
+        until: Option<&End>,
     ) -> Option<Decision> {
-        if let Some(outline) = until {
-            let end = Region::new(outline);
-            if end.depth(view.robot.position) > INSIDE && end.depth(person.position()) > INSIDE {
-                return Some((STAND, Status::Arrived));
-            }
+        if until.is_some_and(|end| end.is_reached(view.robot.position, person.position())) {
+            return Some((STAND, Status::Arrived));
         }
         let destination = course.destination?;
         let gap = distance(&view.robot.position, &destination.point);

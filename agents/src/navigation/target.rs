@@ -37,10 +37,30 @@ pub enum Target {
         name: String,
         /// At which place.
         place: Company,
-        /// Where the way together ends, world frame: when both are well inside this region. Without
-        /// it, it ends with the task.
-        until: Option<Vec<Point2<f64>>>,
+        /// Where the way together ends; without it, it ends with the task.
+        until: Option<End>,
     },
+}
+
+/// Where a way together ends: when both are well inside a region, and the robot out of its entry.
+#[derive(Debug, Clone, PartialEq)]
+pub struct End {
+    /// The region's outline, world frame.
+    pub polygon: Vec<Point2<f64>>,
+    /// Where one comes in, such as the middle of the door.
+    pub entry: Option<Point2<f64>>,
+}
+
+impl End {
+    /// Whether a robot and its companion at these places are at the end.
+    pub fn is_reached(&self, robot: Point2<f64>, companion: Point2<f64>) -> bool {
+        let region = Region::new(&self.polygon);
+        let inside = |place| region.depth(place) > INSIDE;
+        let clear = self
+            .entry
+            .is_none_or(|entry| distance(&entry, &robot) > CLEAR_OF_ENTRY);
+        inside(robot) && inside(companion) && clear
+    }
 }
 
 /// Where the robot goes that keeps somebody company.
@@ -87,6 +107,8 @@ pub struct Destination {
 
 /// The robot is inside a region when it is so far from its outline, metres.
 pub const INSIDE: f64 = 0.3;
+/// Who stands this far from an entry leaves others room to come in, metres.
+const CLEAR_OF_ENTRY: f64 = 1.3;
 /// How far from the entry a place inside is looked for, metres, most wanted first.
 const BEYOND_ENTRY: [f64; 4] = [0.8, 1.0, 1.2, 0.6];
 /// A place inside should be so far from the outline, metres.
@@ -176,7 +198,7 @@ const BEHIND: f64 = 0.9;
 /// The robot aims at where its companion will be in so many seconds: it brakes for the end of its way.
 const AHEAD: f64 = 0.6;
 /// So many times that far ahead, there must be room beside the companion, too: falling behind takes time.
-const FALLING_BEHIND: u32 = 5;
+const FALLING_BEHIND: f64 = 4.0;
 /// The nearest part of the way from a companion to a place that counts, metres: they may walk beside a
 /// wall themselves.
 const OWN_ROOM: f64 = 0.35;
@@ -210,11 +232,13 @@ pub fn places_with(
         })
     };
     // Also where the companion will be while the robot falls behind.
+    let later = ahead * FALLING_BEHIND;
+    let samples = (later.norm() / grid.resolution).ceil().max(1.0);
     let has_room = |offset: Vector2<f64>| {
-        let later = (0..FALLING_BEHIND).map(|k| position + ahead * f64::from(k));
-        later
-            .into_iter()
-            .all(|position| grid.cell_at(position).is_none() || free_from(position, offset))
+        (0..=samples as usize).all(|k| {
+            let then = position + later * (k as f64 / samples);
+            grid.cell_at(then).is_none() || free_from(then, offset)
+        })
     };
     let left = (position - robot)
         .dot(&(turned * Vector2::x()))

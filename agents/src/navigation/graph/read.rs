@@ -4,7 +4,7 @@
 use crate::navigation::control::Limits;
 use crate::navigation::obstacles::Wall;
 use crate::navigation::people::Person;
-use crate::navigation::target::Target;
+use crate::navigation::target::{Company, End, Target};
 use dsr::{EdgeKey, Node, NodeId, ReadError, Snapshot, Time, Value, pose_on_floor};
 use nalgebra::{Isometry2, Point2, Vector2};
 use std::collections::BTreeMap;
@@ -66,8 +66,12 @@ pub(super) struct Step {
 pub(super) enum Work {
     /// To get somewhere.
     Drive(Target),
-    /// To be looked at by the person of that name.
-    TakeAttention(String),
+    /// To be looked at by a person, who is asked with these words.
+    Ask { person: String, words: &'static str },
+    /// To stand until the person of that name is in the robot's room.
+    Wait(String),
+    /// To stand aside until the person of that name has passed.
+    LetPass(String),
 }
 
 /// Why a step cannot be carried out.
@@ -283,21 +287,17 @@ pub(super) fn work(
                 })),
             }
         }
-        "approach" | "goToPerson" | "takeTheAttention" => {
-            match bound_of_type(snapshot, step, "person")? {
-                None => Err(unbound("person")),
-                Some(person) if step.rule == "takeTheAttention" => {
-                    Ok(Work::TakeAttention(person.name()?))
-                }
-                Some(person) => {
-                    let name = person.name()?;
-                    Ok(Work::Drive(Target::Person {
-                        name,
-                        distance: TALKING_DISTANCE,
-                    }))
-                }
+        "approach" | "goToPerson" | "takeTheAttention" | "askForPermission" | "escort"
+        | "follow" | "wait" | "letPass" => match bound_of_type(snapshot, step, "person")? {
+            None => Err(unbound("person")),
+            Some(person) => {
+                let end = match step.binding.get("room2") {
+                    Some(name) => end(snapshot, world, name)?,
+                    None => None,
+                };
+                Ok(with_person(step, person.name()?, end))
             }
-        }
+        },
         "goToPlace" => match bound_of_type(snapshot, step, "place")? {
             None => Err(unbound("place")),
             Some(place) => match place_of(snapshot, place.id())? {
@@ -311,6 +311,46 @@ pub(super) fn work(
             rule: rule.to_owned(),
         }),
     })
+}
+
+/// Where a way together to the room of that name ends.
+fn end(snapshot: &Snapshot, world: &World, name: &str) -> Result<Option<End>, ReadError> {
+    let Some(room) = world.rooms.iter().find(|room| room.name == name) else {
+        return Ok(None);
+    };
+    Ok(Some(End {
+        polygon: room.polygon.clone(),
+        entry: door(snapshot, world.robot.room, room.id)?,
+    }))
+}
+
+/// What a rule asks for that is about somebody.
+fn with_person(step: &Step, name: String, until: Option<End>) -> Work {
+    let company = |place| {
+        Work::Drive(Target::Company {
+            name: name.clone(),
+            place,
+            until: until.clone(),
+        })
+    };
+    match step.rule.as_str() {
+        "takeTheAttention" => Work::Ask {
+            person: name,
+            words: "Excuse me, may I have a moment?",
+        },
+        "askForPermission" => Work::Ask {
+            person: name,
+            words: "Excuse me, may I pass?",
+        },
+        "escort" => company(Company::Beside),
+        "follow" => company(Company::Behind),
+        "wait" => Work::Wait(name),
+        "letPass" => Work::LetPass(name),
+        _ => Work::Drive(Target::Person {
+            name,
+            distance: TALKING_DISTANCE,
+        }),
+    }
 }
 
 fn bound_of_type<'a>(

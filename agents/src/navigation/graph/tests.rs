@@ -1,5 +1,8 @@
 //! Navigation on the graph: steps are carried out, resumed and reported.
 
+mod people;
+
+use super::people::ASKING;
 use super::*;
 use crate::grid::{BLOCKED, CostGrid};
 use crate::navigation::control::{Motion, Unicycle};
@@ -29,6 +32,9 @@ connected = { from = ["room"], to = ["room"] }
 is_near = { from = ["robot"], to = ["person"] }
 front = { from = ["person"], to = ["robot"] }
 at = { from = ["robot"], to = ["place"] }
+allows = { from = ["person"], to = ["robot"] }
+passed = { from = ["person"], to = ["robot"] }
+followed = { from = ["robot"], to = ["person"] }
 [attributes]
 transform = { kind = "pose" }
 walls = { kind = "f64_list" }
@@ -50,7 +56,7 @@ binding = { kind = "string" }
 reason = { kind = "string" }
 "#;
 
-/// The four rules, as far as their effects go.
+/// The rules, as far as their effects go.
 #[derive(Debug)]
 struct Rules;
 
@@ -86,6 +92,11 @@ impl RuleEngine for Rules {
             }
             "approach" => work.create_edge(node("robot")?, "is_near", node("p")?),
             "takeTheAttention" => work.create_edge(node("p")?, "front", node("robot")?),
+            "askForPermission" => work.create_edge(node("p")?, "allows", node("robot")?),
+            "letPass" => work.create_edge(node("p")?, "passed", node("robot")?),
+            "wait" => work.create_edge(node("p")?, "in", node("room")?),
+            "escort" => work.create_edge(node("p")?, "in", node("room2")?),
+            "follow" => work.create_edge(node("robot")?, "followed", node("p")?),
             "goToPlace" => work.create_edge(node("robot")?, "at", node("place")?),
             _ => return Err(refuse("no such rule")),
         }

@@ -36,10 +36,12 @@ impl Navigator {
         let age = course
             .planned
             .map_or(0.0, |planned| view.now.since(planned));
-        let waited = self.count_headway(course, view);
         let company = course.task.target.is_company();
-        // The way that is left is as long as the companion makes it.
-        let waited = if company { 0.0 } else { waited };
+        let waited = if company {
+            self.count_standing(course, view)
+        } else {
+            self.count_headway(course, view)
+        };
         if waited > self.config.give_up_after {
             return (STAND, Status::Failed(Failure::Stuck));
         }
@@ -112,6 +114,17 @@ impl Navigator {
         view.now.since(course.headway)
     }
 
+    /// For how long the robot has stood though its companion is away, seconds: the way that is left is as
+    /// long as the companion makes it, and says nothing.
+    fn count_standing(&self, course: &mut Course, view: &View) -> f64 {
+        course.left = self.band.length();
+        if view.robot.motion.linear.abs() > 0.05 || course.left < 1.0 {
+            course.headway = view.now;
+            course.recoveries = 0;
+        }
+        view.now.since(course.headway)
+    }
+
     /// Backs off slowly, or turns where there is no room behind.
     pub(super) fn back_off(&self, view: &View) -> Motion {
         let (_, behind) = self.config.guard.allowed(view.scan, &view.inputs.limits);
@@ -137,5 +150,6 @@ fn falls_back(course: &Course, view: &View) -> Option<Motion> {
     let way = destination.point - view.robot.position;
     let ahead = way.x * heading.cos() + way.y * heading.sin();
     let near = way.norm() < CATCHING_UP;
-    (near && ahead < 0.0).then(|| turn_to(&view.robot, heading, 0.1))
+    let walks = person_of(&course.task, view.inputs.people).is_some_and(Person::is_walking);
+    (walks && near && ahead < 0.0).then(|| turn_to(&view.robot, heading, 0.1))
 }
