@@ -365,7 +365,7 @@ impl Navigator {
             &[]
         };
         settled.observe(view.now, grid, walkers);
-        let decision = self.go_on(course, settled.grid(), view);
+        let decision = self.go_on(course, settled.with_berth(), view);
         self.settled = settled;
         decision
     }

@@ -50,7 +50,7 @@ impl Default for Settled {
 
 impl Settled {
     /// The grid without walkers and with the berth.
-    pub(super) fn grid(&self) -> &CostGrid {
+    pub(super) fn with_berth(&self) -> &CostGrid {
         &self.kept_off
     }
 
@@ -191,7 +191,7 @@ mod tests {
 
     #[test]
     fn who_walks_leaves_no_trace_and_who_stands_does() {
-        let at = |settled: &Settled, x: f64| settled.grid().cost((((x * 10.0) as usize), 50));
+        let at = |settled: &Settled, x: f64| settled.with_berth().cost((((x * 10.0) as usize), 50));
         let mut settled = Settled::default();
         let mut now = Time::from_seconds(1.0);
         let mut x = 3.0;
@@ -229,11 +229,19 @@ mod tests {
         settled.observe(Time::from_seconds(1.0), &grid, &[]);
         let cost = |x: f64| {
             settled
-                .grid()
+                .with_berth()
                 .cost(grid.cell_at(Point2::new(x, 0.5)).unwrap())
         };
-        assert_eq!([cost(0.1), cost(0.3), cost(0.82)], [1.4, FREE, FREE]);
-        assert_eq!([cost(0.87), cost(0.98), cost(1.02)], [3.0, 3.0, 3.5]);
+        for (x, expected) in [
+            (0.1, 1.4),
+            (0.3, FREE),
+            (0.82, FREE),
+            (0.87, 3.0),
+            (0.98, 3.0),
+            (1.02, 3.5),
+        ] {
+            assert!((cost(x) - expected).abs() < 1e-6, "{} at {x}", cost(x));
+        }
         assert!(cost(1.9) >= BLOCKED);
     }
 }

@@ -280,6 +280,10 @@ struct RaiseZones<'a> {
 impl NullaryFnOnce for RaiseZones<'_> {
     type Output = ();
 
+    #[allow(
+        clippy::inline_always,
+        reason = "only what is inlined into a function for a wide vector unit makes use of that"
+    )]
     #[inline(always)]
     fn call(self) {
         let Self {

@@ -295,7 +295,7 @@ pub(super) fn work(
                     Some(name) => end(snapshot, world, name)?,
                     None => None,
                 };
-                Ok(with_person(step, person.name()?, end))
+                Ok(with_person(step, person.name()?, end.as_ref()))
             }
         },
         "goToPlace" => match bound_of_type(snapshot, step, "place")? {
@@ -325,12 +325,12 @@ fn end(snapshot: &Snapshot, world: &World, name: &str) -> Result<Option<End>, Re
 }
 
 /// What a rule asks for that is about somebody.
-fn with_person(step: &Step, name: String, until: Option<End>) -> Work {
+fn with_person(step: &Step, name: String, until: Option<&End>) -> Work {
     let company = |place| {
         Work::Drive(Target::Company {
             name: name.clone(),
             place,
-            until: until.clone(),
+            until: until.cloned(),
         })
     };
     match step.rule.as_str() {
