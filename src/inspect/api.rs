@@ -8,7 +8,7 @@ use crate::view::map::Map;
 use crate::view::{graph as nodes, grid, mission};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use dsr::NodeId;
+use dsr::{NodeId, Snapshot, Version};
 use serde::Deserialize;
 use serde_json::{Value as Json, json};
 use std::time::Duration;
@@ -17,6 +17,8 @@ use std::time::Duration;
 const PATIENCE: Duration = Duration::from_millis(200);
 /// So many entries of a history.
 const HISTORY: usize = 100;
+/// So many commits before a time.
+const COMMITS: u64 = 80;
 
 /// What a question says beside its name.
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -48,6 +50,7 @@ pub(super) fn answer(
         "why" => looker
             .at(question.at)
             .and_then(|snapshot| why::explain(&snapshot, path.filter(|path| !path.is_empty()))),
+        "commits" => looker.at(question.at).map(|snapshot| commits(&snapshot)),
         "agenda" => of(looker, question.at, agenda),
         "grid" => social_grid(looker),
         _ => return None,
@@ -57,7 +60,7 @@ pub(super) fn answer(
 fn of(
     looker: &mut Looker,
     at: Option<f64>,
-    look: impl Fn(&dsr::Snapshot) -> Result<Json, dsr::ReadError>,
+    look: impl Fn(&Snapshot) -> Result<Json, dsr::ReadError>,
 ) -> Result<Json, Failure> {
     match (&mut looker.source, at) {
         // As often as it takes not to be overtaken.
@@ -96,8 +99,23 @@ fn node(looker: &mut Looker, question: &Question) -> Result<Json, Failure> {
     found.ok_or_else(|| Failure::input(format!("there is no node {id} then")))
 }
 
+/// The last commits up to a snapshot, newest first: by whom and by which rules, as far as they are kept.
+fn commits(snapshot: &Snapshot) -> Json {
+    let version = snapshot.version().0;
+    let versions = (version.saturating_sub(COMMITS)..=version).rev();
+    let row = |version| {
+        let cause = executive::Cause::find(snapshot, Version(version))
+            .ok()
+            .flatten()?;
+        Some(json!({
+            "version": version, "time": cause.time, "agent": cause.agent, "rules": cause.rules,
+        }))
+    };
+    versions.filter_map(row).collect()
+}
+
 /// What is to take place when, at which object, by start.
-fn agenda(snapshot: &dsr::Snapshot) -> Result<Json, dsr::ReadError> {
+fn agenda(snapshot: &Snapshot) -> Result<Json, dsr::ReadError> {
     let mut rows = Vec::new();
     for activity in snapshot.nodes_of("activity") {
         let activity = activity?;

@@ -36,6 +36,7 @@ struct Row {
     x: f64,
     y: f64,
     height: f64,
+    wide: f64,
 }
 
 fn reach(count: usize) -> f64 {
@@ -82,6 +83,12 @@ impl Layout {
             if !self.nodes.contains_key(&id) {
                 fresh.entry(key).or_default().push(id);
             }
+        }
+        if self.clusters.is_empty() {
+            // About as wide as high, all in all, for what is there at first.
+            let side = |ids: &Vec<NodeId>| 2.0 * reach(ids.len() + ids.len() / 2);
+            let area: f64 = fresh.values().map(|ids| side(ids).powi(2)).sum();
+            self.row.wide = (1.4 * area.sqrt()).max(800.0);
         }
         for (key, ids) in fresh {
             self.enter(&key, &ids);
@@ -135,8 +142,7 @@ impl Layout {
 impl Row {
     /// The middle of a place of that radius.
     fn place(&mut self, radius: f64) -> [f64; 2] {
-        const WIDE: f64 = 1600.0;
-        if self.x > 0.0 && self.x + 2.0 * radius > WIDE.max(2.0 * radius) {
+        if self.x > 0.0 && self.x + 2.0 * radius > self.wide {
             (self.x, self.y) = (0.0, self.y + self.height);
             self.height = 0.0;
         }

@@ -153,6 +153,13 @@ fn every_question_of_the_page_is_answered_as_of_now_and_as_of_then() {
     assert_eq!(history["entries"].as_array().unwrap().len(), 2);
     let why = inspected.get("/api/why?path=robot.max_speed");
     assert!(why["text"].as_str().unwrap().contains("by setup"), "{why}");
+    let commits = inspected.get("/api/commits?at=1005");
+    let told = commits.as_array().unwrap().len();
+    assert_eq!(
+        (told, &commits[0]["agent"]),
+        (1, &json!("setup")),
+        "{commits}"
+    );
     assert_eq!(inspected.get("/api/missions"), json!([]));
     assert_eq!(inspected.get("/api/agenda"), json!([]));
     assert_eq!(inspected.get("/api/grid"), json!(null));

@@ -130,10 +130,10 @@ export class Board {
 }
 
 // A colour for a word, the same each time.
-export function colour(word, light = 50) {
+export function colour(word) {
   let hash = 2166136261;
   for (const c of word) hash = Math.imul(hash ^ c.codePointAt(0), 16777619);
-  return `hsl(${(hash >>> 0) % 360} 55% ${light}%)`;
+  return `hsl(${(hash >>> 0) % 360} ${45 + ((hash >>> 9) % 35)}% ${36 + ((hash >>> 16) % 26)}%)`;
 }
 
 export function ink(name) {

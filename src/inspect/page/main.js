@@ -66,6 +66,10 @@ async function loadRest() {
   map.set(place);
   [state.missions, state.agenda] = [list, agenda];
   if (state.at === null && state.tab === 'map') loadGrid(); else map.setGrid(null);
+  if (state.at !== null) {
+    $('log').replaceChildren();
+    showCommits((await ask('commits', then())).reverse());
+  }
   showText();
   describe();
 }
@@ -262,8 +266,8 @@ function tell(frame) {
     if (commit.time - rate.since > 2) Object.assign(rate, { rate: rate.count / (commit.time - rate.since), count: 0, since: commit.time });
     state.rates.set(commit.agent, rate);
   }
-  showCommits(frame.commits ?? []);
   if (state.at !== null) { showClock(); return; }
+  showCommits(frame.commits ?? []);
   if (frame.structure) loadGraph().catch((error) => say(error.message, true));
   if (state.tab === 'graph') graph.light(frame.changed ?? []);
   if (frame.map) map.set(frame.map);
@@ -279,7 +283,7 @@ function showCommits(commits) {
     const line = element('li');
     line.append(element('span', clock(commit.time), { class: 'soft' }), ' ', element('b', commit.agent), ' ');
     if (commit.rules.length) line.append(element('span', commit.rules.join(', '), { class: 'rule' }), ' ');
-    line.append(commit.what);
+    line.append(commit.what ?? '');
     line.title = `version ${commit.version}`;
     $('log').prepend(line);
   }

@@ -147,7 +147,7 @@ export class MapView {
     const [w, h] = object.size;
     if (object.circle) { pen.beginPath(); pen.arc(0, 0, w / 2, 0, 7); pen.fill(); } else pen.fillRect(-w / 2, -h / 2, w, h);
     pen.restore();
-    this.names.push([object.name, [x, y], ink('--soft')]);
+    if (px < 1 / 45) this.names.push([object.name, [x, y], ink('--soft')]);
   }
 
   camera(pen, camera, px) {
