@@ -100,6 +100,12 @@ pub(crate) enum Verb {
     /// People and the space they need: groups, how little a place suits a robot
     #[command(after_help = "Example:\n  cortex social groups recording.json --json")]
     Social(Social),
+    /// Tell where an object is, or may be
+    #[command(
+        after_help = "Ends with 1 where the object is known and nobody knows where it is.\n\n\
+        Example:\n  cortex where mug --instance default --json"
+    )]
+    Where(Where),
     /// Do the papers' tables and figures again, ours beside what is printed
     #[command(
         after_help = "Examples:\n  cortex experiment list\n  cortex experiment fd-table1 --json"
@@ -119,6 +125,14 @@ pub(crate) enum Verb {
     /// Write manual pages
     #[command(after_help = "Example:\n  cortex man ~/.local/share/man/man1")]
     Man(Man),
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Where {
+    /// Name of an object or person, or a class such as `mug`
+    pub(crate) name: String,
+    #[command(flatten)]
+    pub(crate) source: GraphSource,
 }
 
 #[derive(Debug, Clone, Args)]

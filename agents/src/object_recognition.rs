@@ -1,4 +1,5 @@
-//! Object recognition: detections of objects to objects with one place each.
+//! Object recognition: detections of objects to objects, each with the place where it was seen last and
+//! those where it may be.
 //!
 //! A detection belongs to the object it names, or to the nearest of its class (optimally assigned).
 //! Several sightings make an object, averaging makes its pose, and looks that should have shown it
@@ -8,13 +9,17 @@
 mod candidate;
 mod config;
 mod graph;
+mod memory;
 mod place;
+mod whereabouts;
 
 #[cfg(test)]
 mod tests;
 
-pub use config::Config;
+pub use config::{Config, MemoryConfig};
 pub use graph::{ObjectRecognition, objects};
+pub use memory::Place;
+pub use whereabouts::{Whereabouts, whereabouts};
 
 use crate::messages::{CameraFrame, ObjectDetection};
 use crate::perception::{FloorPlan, Pair, assign, hides, in_time_order, is_finite_pose, sees};
@@ -44,7 +49,7 @@ pub struct RecognizedObject {
     pub identified: bool,
     /// What it is, a type of the schema such as `table`.
     pub class: String,
-    /// Where it is and faces, world frame.
+    /// Where it was seen last and faces, world frame.
     pub pose: Isometry2<f64>,
     /// Extent along its own x and y, m.
     pub size: Vector2<f64>,
@@ -54,6 +59,11 @@ pub struct RecognizedObject {
     pub last_seen: Time,
     /// The room it is in, where there is one.
     pub in_room: Option<String>,
+    /// Where it may be, the likeliest place first. What the probabilities lack of one is for somewhere
+    /// else.
+    pub places: Vec<Place>,
+    /// When those probabilities hold.
+    pub remembered: Time,
 }
 
 /// A usable detection in the world frame.
@@ -142,6 +152,7 @@ impl Recognizer {
             let position = object.place.position();
             let room = plan.room_after(object.room.as_deref(), position, config.room_margin);
             object.room = room.map(str::to_owned);
+            object.memory.pass(now, &config.memory);
         }
         let mut recognized: Vec<_> = self
             .objects
@@ -261,17 +272,24 @@ impl Recognizer {
             .map(|p| frame.world_from_camera * p.position)
             .collect();
         let body_radius = self.config.body_radius;
-        for object in &mut self.objects {
+        for object in self
+            .objects
+            .iter_mut()
+            .filter(|o| o.last_frame != self.frame)
+        {
             let margin = self.config.view_margin + object.size.norm() / 2.0;
-            let place = object.place.position();
-            let visible = object.last_frame != self.frame
-                && sees(frame, plan, place, margin)
-                && !bodies
-                    .iter()
-                    .any(|&body| hides(camera, body, place, body_radius));
-            if visible {
+            let visible = |place| {
+                sees(frame, plan, place, margin)
+                    && !bodies
+                        .iter()
+                        .any(|&body| hides(camera, body, place, body_radius))
+            };
+            if visible(object.place.position()) {
                 object.missed(frame.time, &self.config);
             }
+            object
+                .memory
+                .looked_in_vain(frame.time, visible, &self.config);
         }
     }
 
@@ -319,8 +337,10 @@ impl Recognizer {
         let gone = &mut self.objects[old];
         gone.confirmed = false;
         let (name, room, identified) = (gone.name.take(), gone.room.take(), gone.identified);
+        let memory = std::mem::take(&mut gone.memory);
         let here = &mut self.objects[new];
         (here.name, here.room, here.identified) = (name, room, identified);
+        here.memory = memory;
     }
 
     /// The next name of the candidate's class that nobody has.

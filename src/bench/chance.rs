@@ -18,4 +18,9 @@ impl Chance {
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         ((z ^ (z >> 31)) % u64::from(end.max(1))) as u32
     }
+
+    /// A number in [0, 1).
+    pub(crate) fn share(&mut self) -> f64 {
+        f64::from(self.below(u32::MAX)) / f64::from(u32::MAX)
+    }
 }

@@ -104,7 +104,7 @@ fn frames(time: Time, people: &[Isometry2<f64>], chance: &mut Chance) -> Vec<Cam
         let mut seen = Vec::new();
         for person in people {
             let local = world_from_camera.inv_mul(person);
-            if local.translation.vector.norm() < RANGE && share(chance) >= MISSES {
+            if local.translation.vector.norm() < RANGE && chance.share() >= MISSES {
                 let noise = Vector2::new(normal(chance), normal(chance)) * NOISE;
                 seen.push(PersonDetection {
                     position: Point2::from(local.translation.vector + noise),
@@ -113,11 +113,11 @@ fn frames(time: Time, people: &[Isometry2<f64>], chance: &mut Chance) -> Vec<Cam
                 });
             }
         }
-        if share(chance) < FALSE_RATE / RATE {
-            let (direction, distance) = (share(chance) * TAU, share(chance).sqrt() * RANGE);
+        if chance.share() < FALSE_RATE / RATE {
+            let (direction, distance) = (chance.share() * TAU, chance.share().sqrt() * RANGE);
             seen.push(PersonDetection {
                 position: Point2::new(direction.cos() * distance, direction.sin() * distance),
-                heading: Some(share(chance) * TAU),
+                heading: Some(chance.share() * TAU),
                 score: 0.6,
             });
         }
@@ -134,13 +134,8 @@ fn frames(time: Time, people: &[Isometry2<f64>], chance: &mut Chance) -> Vec<Cam
     frames
 }
 
-/// A number in [0, 1).
-fn share(chance: &mut Chance) -> f64 {
-    f64::from(chance.below(u32::MAX)) / f64::from(u32::MAX)
-}
-
 /// Normal with mean 0 and deviation 1.
 fn normal(chance: &mut Chance) -> f64 {
-    let radius = (-2.0 * (1.0 - share(chance)).ln()).sqrt();
-    radius * (TAU * share(chance)).cos()
+    let radius = (-2.0 * (1.0 - chance.share()).ln()).sqrt();
+    radius * (TAU * chance.share()).cos()
 }

@@ -18,6 +18,7 @@ mod run;
 mod shell;
 mod social;
 mod store;
+mod where_is;
 pub(crate) mod why;
 
 pub(crate) use agent::AGENTS;
@@ -52,6 +53,7 @@ pub(crate) fn perform(verb: Verb) -> Result<Answer, Failure> {
             crate::bench::play(&arguments.role, &arguments.instance, &arguments.numbers)
         }
         Verb::Social(arguments) => social::run(&arguments),
+        Verb::Where(arguments) => where_is::run(&arguments),
         Verb::Experiment(arguments) => experiment::run(&arguments),
         Verb::Doctor(arguments) => doctor::run(&arguments),
         Verb::New(arguments) => new::run(&arguments),

@@ -466,6 +466,7 @@ fn perception_is_held_against_recorded_and_simulated_people() {
         assert!(figure("position_rmse") < 0.1, "{table}");
         assert!(figure("heading_error") < 0.1, "{table}");
         assert!(figure("latency_p99") > 0.0, "{table}");
+        assert!(figure("right_place") > 40.0, "{table}");
         let sort = table["rows"][1]["values"]["mota"].as_f64().unwrap();
         assert!(figure("mota") >= sort, "{table}");
         assert_eq!(

@@ -1,5 +1,5 @@
-//! `cortex graph` from outside: what each verb answers of a file and of a running graph, and with which
-//! exit code.
+//! `cortex graph` and `cortex where` from outside: what each verb answers of a file and of a running graph,
+//! and with which exit code.
 
 use crate::support::{Process, Program, TestInstance};
 use dsr::{EdgeRef, Operation, Pose, Session, Time, Transaction};
@@ -380,4 +380,50 @@ fn a_running_graph_tells_transforms() {
     assert_eq!((code, said.contains("no `history`")), (1, true), "{said}");
     drop(session);
     store.finish();
+}
+
+#[test]
+fn where_ranks_places_and_says_when_there_are_none() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("world.json");
+    let world = r#"{"format":"dsr/1","nodes":[
+     {"id":1,"type":"mug","name":"blue","attributes":{"places":[1.5,2.5,0.5,0.7,2.0,10.5, 5.5,2.5,0.5,0.2,1.0,5.5]}},
+     {"id":2,"type":"mug","name":"red","attributes":{"places":[3.5,2.5,0.5,0.9,1.0,9.5]}},
+     {"id":3,"type":"book","name":"novel","attributes":{}}],"edges":[]}"#;
+    fs::write(&file, world).unwrap();
+    let file = file.to_str().unwrap();
+    let ask = |what: &str| {
+        let output = Program::run(&["where", what, "--file", file, "--json"]);
+        let text = |bytes| String::from_utf8(bytes).unwrap();
+        (
+            output.status.code().unwrap(),
+            text(output.stdout),
+            text(output.stderr),
+        )
+    };
+    let places = |what: &str| -> Vec<(String, f64)> {
+        let (code, out, err) = ask(what);
+        assert_eq!(code, 0, "{err}");
+        let answer: Json = serde_json::from_str(&out).unwrap();
+        assert_eq!(answer["name"], what);
+        let rows = answer["places"].as_array().unwrap().iter();
+        rows.map(|row| {
+            let object = row["object"].as_str().unwrap().to_owned();
+            (object, row["probability"].as_f64().unwrap())
+        })
+        .collect()
+    };
+    let told = |rows: &[(&str, f64)]| -> Vec<(String, f64)> {
+        let row = |(name, p): &(&str, f64)| ((*name).to_owned(), *p);
+        rows.iter().map(row).collect()
+    };
+    assert_eq!(places("blue"), told(&[("blue", 0.7), ("blue", 0.2)]));
+    assert_eq!(
+        places("mug"),
+        told(&[("red", 0.9), ("blue", 0.7), ("blue", 0.2)])
+    );
+    assert_eq!(ask("novel").0, 1);
+    let (code, _, err) = ask("blu");
+    assert_eq!(code, 2);
+    assert!(err.contains("did you mean `blue`?"), "{err}");
 }

@@ -1,6 +1,7 @@
 //! One object, and the evidence for and against it standing where it is believed to.
 
 use super::config::Config;
+use super::memory::Memory;
 use super::place::Place;
 use super::{RecognizedObject, Sighting};
 use dsr::Time;
@@ -30,6 +31,8 @@ pub(super) struct Candidate {
     pub(super) missed_until: Time,
     pub(super) existence: f64,
     pub(super) room: Option<String>,
+    /// Where else it may be.
+    pub(super) memory: Memory,
 }
 
 /// How much a size changes with one more sighting, once it is the mean of as many as this inverts.
@@ -54,6 +57,7 @@ impl Candidate {
             missed_until: object.last_seen,
             existence: object.confidence.clamp(0.01, 0.999),
             room: object.in_room.clone(),
+            memory: Memory::resumed(object.places.clone(), object.remembered),
         }
     }
 
@@ -75,12 +79,16 @@ impl Candidate {
             missed_until: time,
             existence: 0.5,
             room: None,
+            memory: Memory::default(),
         }
     }
 
     /// Takes in a sighting that frame number `frame` showed.
     pub(super) fn hit(&mut self, time: Time, sighting: &Sighting, frame: u64, config: &Config) {
         self.place.update(time, sighting.pose, config);
+        if self.confirmed {
+            self.remember(time, sighting, config);
+        }
         self.hits = self.hits.saturating_add(1);
         let gain = (1.0 / f64::from(self.hits)).max(SIZE_GAIN);
         self.size += (sighting.detection.size - self.size) * gain;
@@ -92,6 +100,15 @@ impl Candidate {
         let present = self.existence * config.detection_probability;
         let chance = config.false_probability * (1.0 - self.existence);
         self.existence = (present / (present + chance)).min(0.999);
+    }
+
+    /// Notes where it was seen: at its place, or where it seems to be instead.
+    fn remember(&mut self, time: Time, sighting: &Sighting, config: &Config) {
+        let settled = self.place.pose();
+        let apart = settled.translation.vector - sighting.pose.translation.vector;
+        let same = apart.norm() <= config.memory.same_place;
+        let pose = if same { settled } else { sighting.pose };
+        self.memory.saw(time, pose, &config.memory);
     }
 
     /// A camera looked and did not see it. Looks in quick succession fail for the same reason, so
@@ -140,6 +157,8 @@ impl Candidate {
             confidence: self.existence,
             last_seen: self.last_seen,
             in_room: self.room.clone(),
+            places: self.memory.ranked(),
+            remembered: self.memory.time().unwrap_or(self.last_seen),
         })
     }
 }

@@ -57,6 +57,41 @@ pub struct Config {
     pub view_margin: f64,
     /// How far outside a room an object in it must get to have left it, m.
     pub room_margin: f64,
+    /// Where objects may be.
+    pub memory: MemoryConfig,
+}
+
+/// The figures of the memory of places, whose law `object_recognition/memory.rs` states.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MemoryConfig {
+    /// How long an object stays where it is before somebody takes it elsewhere, on average, s.
+    pub stay: f64,
+    /// Probability that a look at the object's place detects it. Lower than a detector's own figure:
+    /// what hides an object hides it for many looks in a row.
+    pub detection_probability: f64,
+    /// Probability that a detection of the object is none of it.
+    pub false_probability: f64,
+    /// Of the probability that the object is somewhere unknown, the share that a new place begins
+    /// with.
+    pub new_place: f64,
+    /// Sightings this near to each other are at one place, m.
+    pub same_place: f64,
+    /// So many places are remembered; a new one takes the place of the least visited.
+    pub most_places: usize,
+}
+
+impl Default for MemoryConfig {
+    fn default() -> Self {
+        Self {
+            stay: 4.0 * 3600.0,
+            detection_probability: 0.5,
+            false_probability: 0.05,
+            new_place: 0.1,
+            same_place: 0.5,
+            most_places: 8,
+        }
+    }
 }
 
 impl Default for Config {
@@ -84,6 +119,7 @@ impl Default for Config {
             identity_confidence: 0.1,
             view_margin: 0.2,
             room_margin: 0.2,
+            memory: MemoryConfig::default(),
         }
     }
 }

@@ -2,22 +2,28 @@
 //! difference to the snapshot.
 //!
 //! Written: `pose` (moved by 1 cm or 1 degree), `size` (1 cm), `confidence` (0.05), `last_seen`
-//! (every 0.5 s) and `in`; the type and `shape` only of nodes made here. Only nodes made here, of
+//! (every 0.5 s), `in`, and `places` with `places_at` (another order, 0.02, 5 cm or 10 s); the type and `shape` only of nodes made here. Only nodes made here, of
 //! objects without identity, are ever deleted: others belong to whoever described the world.
 
-use super::{Config, RecognizedObject, Recognizer};
+use super::{Config, Place, RecognizedObject, Recognizer};
 use crate::messages::CameraFrame;
 use crate::perception::graph::{
     Difference, LAST_SEEN_PERIOD, floor_plan, number, numbers, targets,
 };
-use dsr::{Node, ReadError, Schema, Snapshot, Time, Transaction};
-use nalgebra::Vector2;
+use dsr::{Node, ReadError, Schema, Snapshot, Time, Transaction, Value};
+use nalgebra::{Isometry2, Vector2};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Sizes are written when they changed by more than this, m.
 const SIZE_STEP: f64 = 0.01;
 /// Confidences are written when they changed by more than this.
 const CONFIDENCE_STEP: f64 = 0.05;
+
+/// A place's probability, its position (m) and heading (rad), and when it was last seen there (s) are
+/// written when one of them changed by more than this.
+const PLACE_STEP: [f64; FIGURES] = [0.05, 0.05, 0.1, 0.02, 0.5, 10.0];
+/// What stands for a place: x, y, heading, probability, visits, `last_seen`.
+const FIGURES: usize = 6;
 
 /// Object recognition as an agent: frames and a snapshot in, a transaction out.
 #[derive(Debug)]
@@ -56,12 +62,44 @@ pub fn objects(snapshot: &Snapshot) -> Result<Vec<RecognizedObject>, ReadError> 
             },
             confidence: number(&node, "confidence")?.unwrap_or(0.5),
             last_seen: Time::from_seconds(last_seen),
+            places: places(&node)?,
+            remembered: Time::from_seconds(number(&node, "places_at")?.unwrap_or(last_seen)),
         });
     }
     Ok(objects)
 }
 
-fn object_nodes(snapshot: &Snapshot) -> Result<BTreeMap<String, Node<'_>>, ReadError> {
+/// Where the node says that its object may be, the likeliest place first.
+pub(super) fn places(node: &Node) -> Result<Vec<Place>, ReadError> {
+    let figures = numbers(node, "places")?;
+    let places = figures.chunks_exact(FIGURES).map(|place| Place {
+        pose: Isometry2::new(Vector2::new(place[0], place[1]), place[2]),
+        probability: place[3],
+        visits: place[4].clamp(0.0, f64::from(u32::MAX)) as u32,
+        last_seen: Time::from_seconds(place[5]),
+    });
+    Ok(places.collect())
+}
+
+/// The same as `places` has it.
+fn listed(places: &[Place]) -> Vec<f64> {
+    let figures = places.iter().flat_map(|place| {
+        let at = place.pose.translation.vector;
+        let heading = place.pose.rotation.angle();
+        let seen = place.last_seen.seconds();
+        [
+            at.x,
+            at.y,
+            heading,
+            place.probability,
+            f64::from(place.visits),
+            seen,
+        ]
+    });
+    figures.collect()
+}
+
+pub(super) fn object_nodes(snapshot: &Snapshot) -> Result<BTreeMap<String, Node<'_>>, ReadError> {
     snapshot
         .nodes_of("object")
         .map(|node| {
@@ -210,5 +248,19 @@ fn update(
         "last_seen",
         object.last_seen.seconds(),
         LAST_SEEN_PERIOD,
-    )
+    )?;
+    let (known, new) = (numbers(node, "places")?, listed(&object.places));
+    let same = known.len() == new.len()
+        && known
+            .iter()
+            .zip(&new)
+            .zip(PLACE_STEP.iter().cycle())
+            .all(|((known, new), step)| (known - new).abs() <= *step);
+    if !same {
+        let at = object.remembered.seconds();
+        difference.transaction.set(node.id(), "places_at", at);
+        let places = Value::F64List(new);
+        difference.transaction.set(node.id(), "places", places);
+    }
+    Ok(())
 }

@@ -201,6 +201,8 @@ last_seen = { kind = "f64" }
 position_covariance = { kind = "vector" }
 shape = { kind = "string" }
 size = { kind = "vector" }
+places = { kind = "f64_list" }
+places_at = { kind = "f64" }
 space = { kind = "f64_list" }
 "#;
 

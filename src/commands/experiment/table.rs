@@ -36,6 +36,8 @@ pub(super) struct Cell {
 /// What stands in a cell.
 #[derive(Clone, PartialEq)]
 pub(super) enum Figure {
+    /// The column is about something else.
+    Nothing,
     Number(f64),
     Text(String),
 }
@@ -84,6 +86,13 @@ impl Cell {
             printed: None,
             tolerance: 0.0,
             deviation: None,
+        }
+    }
+
+    pub(super) fn nothing() -> Self {
+        Self {
+            ours: Figure::Nothing,
+            ..Self::text("")
         }
     }
 
@@ -142,6 +151,7 @@ impl Cell {
 impl Figure {
     fn text_form(&self, digits: usize) -> String {
         match self {
+            Self::Nothing => String::new(),
             Self::Number(number) => format!("{number:.digits$}"),
             Self::Text(text) => text.clone(),
         }
@@ -149,6 +159,7 @@ impl Figure {
 
     fn json_form(&self) -> Value {
         match self {
+            Self::Nothing => Value::Null,
             Self::Number(number) => json!(number),
             Self::Text(text) => json!(text),
         }

@@ -15,7 +15,7 @@ mod write;
 
 pub(crate) use history::rows as history_rows;
 pub(super) use path::{Path, Thing};
-pub(crate) use source::{attach, name_of, no_such, read_graph};
+pub(crate) use source::{Source, attach, name_of, no_such, read_graph};
 pub(crate) use write::transaction as setting;
 
 use crate::cli::{Graph as Arguments, GraphAction};

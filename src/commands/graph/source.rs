@@ -15,7 +15,7 @@ use std::time::Duration;
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// A graph that can be read and changed.
-pub(super) enum Source {
+pub(crate) enum Source {
     Live(Box<Session>),
     File(Box<FileGraph>),
     /// As of the end of what was played of a recording.
@@ -23,14 +23,14 @@ pub(super) enum Source {
 }
 
 /// A graph in a file.
-pub(super) struct FileGraph {
+pub(crate) struct FileGraph {
     path: PathBuf,
     format: Format,
     graph: Graph,
 }
 
 impl Source {
-    pub(super) fn open(source: &GraphSource) -> Result<Self, Failure> {
+    pub(crate) fn open(source: &GraphSource) -> Result<Self, Failure> {
         if source.at.is_some() && !is_recording(source) {
             return Err(Failure::input_with_help(
                 "only a recording can be looked at as of a time",
@@ -61,7 +61,7 @@ impl Source {
         })))
     }
 
-    pub(super) fn snapshot(&mut self) -> Result<Snapshot, Failure> {
+    pub(crate) fn snapshot(&mut self) -> Result<Snapshot, Failure> {
         match self {
             Self::Live(session) => session.snapshot().map_err(Failure::internal),
             Self::File(file) => Ok(file.graph.snapshot()),

@@ -198,3 +198,48 @@ fn an_object_changes_rooms_with_its_place() {
     assert_eq!(room(&home), "west");
     assert_eq!(edges(&home.graph.snapshot(), "in").len(), 1);
 }
+
+#[test]
+fn places_survive_a_restart_and_answer_where_something_is() {
+    let mut home = Home::new(EXACT);
+    let at = |x| thing("mug", Some("mug_of_ana"), x, 0.0);
+    home.go(3.0, &[at(-2.0)]);
+    home.time += 3600.0;
+    home.go(3.0, &[at(2.0)]);
+    let answer = |home: &Home| {
+        let snapshot = home.graph.snapshot();
+        let found = whereabouts(&snapshot, "mug_of_ana").unwrap().unwrap();
+        let row = |w: &Whereabouts| (w.room.clone().unwrap(), w.place.visits);
+        let sum: f64 = found.iter().map(|w| w.place.probability).sum();
+        assert!(sum <= 1.0, "{found:?}");
+        found.iter().map(row).collect::<Vec<_>>()
+    };
+    let told = |rows: [(&str, u32); 2]| rows.map(|(room, visits)| (room.to_owned(), visits));
+    assert_eq!(answer(&home), told([("east", 1), ("west", 1)]));
+    home.agent = ObjectRecognition::new(Config::default());
+    home.go(PERIOD, &[]);
+    assert_eq!(answer(&home), told([("east", 1), ("west", 1)]));
+    // Looked for where it was seen last, but not where it was before, and not found.
+    home.run.cameras.truncate(1);
+    home.run.cameras[0].range = 5.0;
+    home.go(12.0, &[]);
+    assert_eq!(answer(&home)[0].0, "west");
+    let snapshot = home.graph.snapshot();
+    assert_eq!(whereabouts(&snapshot, "teapot").unwrap(), None);
+}
+
+#[test]
+fn a_class_stands_for_all_its_objects_and_an_object_without_memory_is_at_its_pose() {
+    let mut home = Home::new(EXACT);
+    let mut world = Transaction::new();
+    world.create_node("tv", "television", Vec::new());
+    let pose = Isometry2::new(Vector2::new(1.0, 1.0), 0.5);
+    place(&mut world, "world", "television", pose);
+    home.load(&world);
+    home.go(2.0, &[thing("samovar", None, -2.0, 0.0)]);
+    let found = |what| whereabouts(&home.graph.snapshot(), what).unwrap().unwrap();
+    assert_eq!(found("samovar")[0].object, "samovar_1");
+    let tv = &found("tv")[0];
+    assert_eq!((tv.object.as_str(), tv.place.pose), ("television", pose));
+    assert!((tv.place.probability - 1.0).abs() < 1e-12);
+}
