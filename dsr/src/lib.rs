@@ -49,7 +49,7 @@ pub use shm::{
     Lease, LeaseError, Publisher, Session, Store, StoreError, Subscriber, Tick, Update,
 };
 pub use snapshot::{
-    Attribute, Edge, Edges, Element, Neighbors, Node, NodeIds, Snapshot, TransformError,
+    Adjacency, Attribute, Edge, Edges, Element, Neighbors, Node, NodeIds, Snapshot, TransformError,
     TripleCount, TypedEdges, TypedIds, ValueRange,
 };
 pub use state::{State, StateError};

@@ -2,12 +2,14 @@
 //! everything it gives is genuine: where the store has reused the version's memory meanwhile, the
 //! read says [`ReadError::SnapshotTooOld`] and never gives foreign or half-written data.
 
+mod adjacency;
 mod element;
 mod geometry;
 mod past;
 mod petgraph;
 mod scan;
 
+pub use adjacency::Adjacency;
 pub use element::{Attribute, Edge, Element, Node};
 pub use geometry::TransformError;
 pub use petgraph::{Edges, Neighbors};

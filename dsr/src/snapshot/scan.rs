@@ -3,8 +3,8 @@
 
 use super::{Node, Snapshot};
 use crate::arena::record::{SOURCES, TARGETS};
-use crate::arena::tree::{self, Entry, Key, Range};
-use crate::arena::{Address, ReadError, Word, record};
+use crate::arena::tree::{Entry, Key, Range};
+use crate::arena::{Address, ReadError, record};
 use crate::{EdgeKey, LabelId, NodeId, TypeId};
 
 /// Walks a part of a tree.
@@ -53,6 +53,18 @@ impl Scan<'_> {
     }
 }
 
+impl Scan<'_> {
+    /// Gives what is left of the leaf at hand to `visit`, and goes on to the next; whether there is one.
+    fn visit_leaf(&mut self, mut visit: impl FnMut(Key, u64)) -> Result<bool, ReadError> {
+        while let Some((key, word)) = self.range.as_mut().and_then(Range::next_in_leaf) {
+            visit(key, word);
+        }
+        self.snapshot.check()?;
+        let more = self.next_leaf();
+        self.error.take().map_or(Ok(more), Err)
+    }
+}
+
 impl Iterator for Scan<'_> {
     type Item = Result<Entry, ReadError>;
 
@@ -89,6 +101,18 @@ impl<'a> NodeIds<'a> {
     }
 }
 
+impl NodeIds<'_> {
+    /// Gives those that lie together next, each to `visit`; whether there may be more. What is visited is
+    /// known to be genuine only where this gives no error.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn visit_some(&mut self, mut visit: impl FnMut(NodeId)) -> Result<bool, ReadError> {
+        let word = self.word;
+        self.scan.visit_leaf(|key, _| visit(NodeId(key[word])))
+    }
+}
+
 impl Iterator for NodeIds<'_> {
     type Item = Result<NodeId, ReadError>;
 
@@ -109,6 +133,27 @@ pub struct TypedEdges<'a> {
 impl<'a> TypedEdges<'a> {
     pub(super) fn new(scan: Scan<'a>, label: LabelId) -> Self {
         Self { scan, label }
+    }
+}
+
+impl TypedEdges<'_> {
+    /// Gives those that lie together next, each to `visit`; whether there may be more. What is visited is
+    /// known to be genuine only where this gives no error.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn visit_some(
+        &mut self,
+        mut visit: impl FnMut(EdgeKey, [TypeId; 2]),
+    ) -> Result<bool, ReadError> {
+        let label = self.label;
+        self.scan.visit_leaf(|[from, to], ends| {
+            let (from, to) = (NodeId(from), NodeId(to));
+            visit(
+                EdgeKey { from, label, to },
+                record::types_of(ends).map(TypeId),
+            );
+        })
     }
 }
 
@@ -155,109 +200,5 @@ impl<'a> Node<'a> {
     /// reads no other node.
     pub fn typed_sources_of(&self, label: LabelId) -> TypedIds<'a> {
         TypedIds(self.adjacent(SOURCES, [label.0; 2]))
-    }
-}
-
-impl Snapshot {
-    /// Where edges of a label that start at a node end, with the nodes' exact types: of those from an id
-    /// on, in ascending order, some that lie together, each given to `visit`. The id from which to go on,
-    /// or `None` where there are no more. What is visited is known to be genuine only where this gives no
-    /// error.
-    ///
-    /// # Errors
-    /// [`ReadError`].
-    #[inline]
-    pub fn visit_targets(
-        &self,
-        node: NodeId,
-        label: LabelId,
-        from: NodeId,
-        visit: impl FnMut(NodeId, TypeId),
-    ) -> Result<Option<NodeId>, ReadError> {
-        self.visit_ends(TARGETS, node, label, from, visit)
-    }
-
-    /// As [`Self::visit_targets`], where edges start that end at the node.
-    ///
-    /// # Errors
-    /// [`ReadError`].
-    #[inline]
-    pub fn visit_sources(
-        &self,
-        node: NodeId,
-        label: LabelId,
-        from: NodeId,
-        visit: impl FnMut(NodeId, TypeId),
-    ) -> Result<Option<NodeId>, ReadError> {
-        self.visit_ends(SOURCES, node, label, from, visit)
-    }
-
-    #[inline]
-    fn visit_ends(
-        &self,
-        tree: usize,
-        node: NodeId,
-        label: LabelId,
-        from: NodeId,
-        mut visit: impl FnMut(NodeId, TypeId),
-    ) -> Result<Option<NodeId>, ReadError> {
-        let label = u64::from(label.0);
-        let root = self.tree_of(node, tree);
-        let leaf = root.and_then(|root| tree::leaf(&self.arena, root, [label, from.0]));
-        let (entries, next) = match leaf {
-            Ok(leaf) => leaf,
-            Err(address) => return Err(self.broken(address)),
-        };
-        let mut more = next;
-        for [key, id, end] in entries {
-            if key.load() != label {
-                more = None;
-                break;
-            }
-            visit(NodeId(id.load()), TypeId(record::other_type(end.load())));
-        }
-        self.check()?;
-        // Only upwards, so that a walk ends in damaged memory, too.
-        let more = more.filter(|next| next[0] == label && next[1] > from.0);
-        Ok(more.map(|next| NodeId(next[1])))
-    }
-
-    /// Whether the edge is there, by what is known where it starts.
-    ///
-    /// # Errors
-    /// [`ReadError`].
-    pub fn has_edge(&self, key: EdgeKey) -> Result<bool, ReadError> {
-        self.has_end(TARGETS, key.from, key.label, key.to)
-    }
-
-    /// Whether the edge is there, by what is known where it ends.
-    ///
-    /// # Errors
-    /// [`ReadError`].
-    pub fn has_edge_into(&self, key: EdgeKey) -> Result<bool, ReadError> {
-        self.has_end(SOURCES, key.to, key.label, key.from)
-    }
-
-    #[inline]
-    fn has_end(
-        &self,
-        tree: usize,
-        node: NodeId,
-        label: LabelId,
-        other: NodeId,
-    ) -> Result<bool, ReadError> {
-        let key = [u64::from(label.0), other.0];
-        let root = self.tree_of(node, tree);
-        let found = root.and_then(|root| tree::find(&self.arena, root, key));
-        Ok(self.genuine(found)?.is_some())
-    }
-
-    /// A node's tree of edges, empty where there is no such node; not yet known to be genuine.
-    #[inline]
-    fn tree_of(&self, node: NodeId, tree: usize) -> Result<Address, Address> {
-        match self.record(node)? {
-            Some((address, words)) => words.get(tree).map(Word::load).ok_or(address),
-            None => Ok(0),
-        }
     }
 }

@@ -34,19 +34,13 @@ impl Ahead {
         Some(*ends)
     }
 
-    /// Where to read on, after all that was read; `None` where there is no more.
+    /// Where to read on, after all that was read, and what takes it in; `None` where there is no more.
     #[inline]
-    pub(crate) fn read_on(&mut self) -> Option<NodeId> {
+    pub(crate) fn read_on(&mut self) -> Option<(NodeId, &mut Vec<Ends>)> {
         let from = self.more.take()?;
         self.read.clear();
         self.next = 0;
-        Some(from)
-    }
-
-    /// Takes in what was read.
-    #[inline]
-    pub(crate) fn push(&mut self, ends: Ends) {
-        self.read.push(ends);
+        Some((from, &mut self.read))
     }
 
     /// Says where to read on after that.

@@ -8,6 +8,9 @@ use dsr::{EdgeKey, NodeId, ReadError, TypeId};
 use std::fmt;
 use std::sync::Arc;
 
+/// So many are read together where they do not lie together.
+const TOGETHER: usize = 32;
+
 /// Nodes that a variable, or edges whose ends two variables, could stand for.
 pub(crate) enum Candidates<'h, H: Host + 'h> {
     Nothing,
@@ -40,6 +43,52 @@ impl<'h, H: Host> Candidates<'h, H> {
             next: 0,
             ids: None,
         }
+    }
+
+    /// Gives some of those that are left to `visit`; whether there may be more. Without an error only,
+    /// what was visited is there.
+    pub(crate) fn visit_some(
+        &mut self,
+        host: &'h H,
+        mut visit: impl FnMut(Candidate),
+    ) -> Result<bool, ReadError> {
+        match self {
+            Self::Edges(edges) => {
+                return host.visit_edges(edges, |key, types| visit(Candidate::Edge(key, types)));
+            }
+            Self::Members {
+                host,
+                types,
+                next,
+                ids,
+            } => loop {
+                if let Some(ids) = ids {
+                    // They are of the type whose members come last.
+                    let exact = types[*next - 1];
+                    let mut any = false;
+                    let more = host.visit_ids(ids, |id| {
+                        any = true;
+                        visit(Candidate::Node(id, exact));
+                    })?;
+                    if any || more {
+                        return Ok(more || *next < types.len());
+                    }
+                }
+                let Some(&exact) = types.get(*next) else {
+                    return Ok(false);
+                };
+                *next += 1;
+                *ids = Some(host.members(exact));
+            },
+            _ => {}
+        }
+        for _ in 0..TOGETHER {
+            match self.next().transpose()? {
+                Some(candidate) => visit(candidate),
+                None => return Ok(false),
+            }
+        }
+        Ok(true)
     }
 }
 

@@ -90,7 +90,7 @@ impl Grammar {
                     .map(|&slot| query.variables[slot].to_string())
                     .collect(),
                 source: words.source(step.source),
-                checks: words.checks(&step.links, &step.tests),
+                checks: words.checks(step.links.iter().map(|(link, _)| *link), &step.tests),
                 candidates: step.candidates,
                 passing: step.passing,
                 found: seen.as_ref().map(|seen| seen[index]),
@@ -98,7 +98,7 @@ impl Grammar {
         });
         Ok(SearchPlan {
             rule: rule.name.to_string(),
-            checks: words.checks(&plan.links, &plan.tests),
+            checks: words.checks(plan.links.iter().copied(), &plan.tests),
             steps: steps.collect(),
             cost: plan.cost,
             counted: snapshot.is_some(),
@@ -188,7 +188,7 @@ fn run(snapshot: &Snapshot, problem: Problem, plan: &Arc<Plan>) -> Result<Seen, 
             Err(error) => return Err(error.into()),
         }
     };
-    Ok((search.seen().to_vec(), given_up))
+    Ok((search.seen().collect(), given_up))
 }
 
 struct Words<'a> {
@@ -218,12 +218,10 @@ impl Words<'_> {
         }
     }
 
-    fn checks(&self, links: &[usize], tests: &[usize]) -> Vec<String> {
+    fn checks(&self, links: impl Iterator<Item = usize>, tests: &[usize]) -> Vec<String> {
         let condition = self.rule.precondition.as_ref();
         let conditions: Vec<&Condition> = condition.into_iter().flat_map(conjuncts).collect();
-        let links = links
-            .iter()
-            .map(|&link| self.rule.left.edges[link].to_string());
+        let links = links.map(|link| self.rule.left.edges[link].to_string());
         let tests = tests.iter().map(|&test| conditions[test].to_string());
         links.chain(tests).collect()
     }

@@ -23,6 +23,10 @@ pub(crate) trait Host {
     type Node<'a>: Copy
     where
         Self: 'a;
+    /// A node's edges that go one way, found but not yet read.
+    type Adjacency<'a>: Copy
+    where
+        Self: 'a;
     /// Ids of nodes, one after another.
     type Ids<'a>: Iterator<Item = Result<NodeId, ReadError>>
     where
@@ -43,11 +47,14 @@ pub(crate) trait Host {
     fn find(&self, id: NodeId) -> Result<Option<Self::Node<'_>>, ReadError>;
     /// The node's exact type.
     fn type_of(&self, node: Self::Node<'_>) -> TypeId;
-    /// Whether a node has an edge of the label to or from another, by what is known at that node.
+    /// Finds a node's edges; none where there is no such node.
+    fn adjacency(&self, way: Way, of: NodeId) -> Result<Self::Adjacency<'_>, ReadError>;
+    /// Brings edges that were found near the processor: to be asked of many before any of them is read.
+    fn fetch(&self, edges: Self::Adjacency<'_>);
+    /// Whether one of a label leads to or comes from another node.
     fn has_end(
         &self,
-        way: Way,
-        of: NodeId,
+        edges: Self::Adjacency<'_>,
         label: LabelId,
         other: NodeId,
     ) -> Result<bool, ReadError>;
@@ -62,21 +69,34 @@ pub(crate) trait Host {
     fn targets<'a>(&'a self, from: Self::Node<'a>, label: LabelId) -> Self::Ends<'a>;
     /// Where the edges of a label that end at a node start, by ascending id.
     fn sources<'a>(&'a self, to: Self::Node<'a>, label: LabelId) -> Self::Ends<'a>;
-    /// Gives to `visit` some of the nodes at the other ends of a node's edges, of those from an id on by
-    /// ascending id; the id from which to go on, or `None` where there are no more. Without an error
+    /// Gives to `visit` some of the nodes at the other ends of edges that were found, of those from an id
+    /// on by ascending id; the id from which to go on, or `None` where there are no more. Without an error
     /// only, what was visited is there.
     fn visit_ends(
         &self,
-        way: Way,
-        of: NodeId,
+        edges: Self::Adjacency<'_>,
         label: LabelId,
         from: NodeId,
         visit: impl FnMut(NodeId, TypeId),
     ) -> Result<Option<NodeId>, ReadError>;
     /// The nodes of exactly this type.
     fn members(&self, exact: TypeId) -> Self::Ids<'_>;
+    /// Gives some of the ids that are left to `visit`; whether there may be more. Without an error only,
+    /// what was visited is there.
+    fn visit_ids(
+        &self,
+        ids: &mut Self::Ids<'_>,
+        visit: impl FnMut(NodeId),
+    ) -> Result<bool, ReadError>;
     /// The edges of a label.
     fn edges(&self, label: LabelId) -> Self::Edges<'_>;
+    /// Gives some of the edges that are left to `visit`; whether there may be more. Without an error only,
+    /// what was visited is there.
+    fn visit_edges(
+        &self,
+        edges: &mut Self::Edges<'_>,
+        visit: impl FnMut(EdgeKey, [TypeId; 2]),
+    ) -> Result<bool, ReadError>;
     /// Among other nodes, those whose value of an attribute is in the range; only of attributes
     /// with an index.
     fn by_value(&self, attribute: AttributeId, range: &ValueRange) -> Self::Ids<'_>;
@@ -87,12 +107,13 @@ pub(crate) trait Host {
     fn triples(&self, label: LabelId, visit: &mut dyn FnMut(TripleCount)) -> Result<(), ReadError>;
 
     fn has_edge(&self, key: EdgeKey) -> Result<bool, ReadError> {
-        self.has_end(Way::Out, key.from, key.label, key.to)
+        self.has_end(self.adjacency(Way::Out, key.from)?, key.label, key.to)
     }
 }
 
 impl Host for Snapshot {
     type Node<'a> = dsr::Node<'a>;
+    type Adjacency<'a> = dsr::Adjacency<'a>;
     type Ids<'a> = dsr::NodeIds<'a>;
     type Ends<'a> = dsr::TypedIds<'a>;
     type Edges<'a> = dsr::TypedEdges<'a>;
@@ -111,18 +132,26 @@ impl Host for Snapshot {
     }
 
     #[inline]
+    fn adjacency(&self, way: Way, of: NodeId) -> Result<Self::Adjacency<'_>, ReadError> {
+        match way {
+            Way::Out => self.edges_from(of),
+            Way::In => self.edges_into(of),
+        }
+    }
+
+    #[inline]
+    fn fetch(&self, edges: Self::Adjacency<'_>) {
+        edges.fetch();
+    }
+
+    #[inline]
     fn has_end(
         &self,
-        way: Way,
-        of: NodeId,
+        edges: Self::Adjacency<'_>,
         label: LabelId,
         other: NodeId,
     ) -> Result<bool, ReadError> {
-        let key = |from, to| EdgeKey { from, label, to };
-        match way {
-            Way::Out => self.has_edge(key(of, other)),
-            Way::In => self.has_edge_into(key(other, of)),
-        }
+        edges.has(label, other)
     }
 
     fn node_value(
@@ -151,24 +180,36 @@ impl Host for Snapshot {
     #[inline]
     fn visit_ends(
         &self,
-        way: Way,
-        of: NodeId,
+        edges: Self::Adjacency<'_>,
         label: LabelId,
         from: NodeId,
         visit: impl FnMut(NodeId, TypeId),
     ) -> Result<Option<NodeId>, ReadError> {
-        match way {
-            Way::Out => self.visit_targets(of, label, from, visit),
-            Way::In => self.visit_sources(of, label, from, visit),
-        }
+        edges.visit(label, from, visit)
     }
 
     fn members(&self, exact: TypeId) -> Self::Ids<'_> {
         self.ids_of_type(exact)
     }
 
+    fn visit_ids(
+        &self,
+        ids: &mut Self::Ids<'_>,
+        visit: impl FnMut(NodeId),
+    ) -> Result<bool, ReadError> {
+        ids.visit_some(visit)
+    }
+
     fn edges(&self, label: LabelId) -> Self::Edges<'_> {
         self.typed_edges_of_label(label)
+    }
+
+    fn visit_edges(
+        &self,
+        edges: &mut Self::Edges<'_>,
+        visit: impl FnMut(EdgeKey, [TypeId; 2]),
+    ) -> Result<bool, ReadError> {
+        edges.visit_some(visit)
     }
 
     fn by_value(&self, attribute: AttributeId, range: &ValueRange) -> Self::Ids<'_> {

@@ -5,10 +5,12 @@
 
 use super::ahead::Ends;
 use super::environment::Environment;
+use super::host::Way;
 use super::program::{Link, Slot, Test};
 use super::query::Query;
 use super::statistics::Statistics;
 use crate::Comparison;
+use dsr::LabelId;
 
 /// How a step finds candidates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,18 +31,39 @@ pub(crate) enum Source {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Step {
     pub(crate) source: Source,
+    /// The label of its links, if it has one and the schema has that.
+    pub(crate) label: Option<LabelId>,
     /// The slots that it binds.
     pub(crate) binds: [Option<usize>; 2],
     /// Slots bound before it that a node of each new slot could be, too, but must not.
     pub(crate) others: [Vec<usize>; 2],
-    /// Links (by index) tested after it.
-    pub(crate) links: Vec<usize>,
+    /// Where edges are looked at: at the node whose links it follows, if it does, then at those of the
+    /// links tested after it whose nodes are bound before it.
+    pub(crate) anchors: Vec<Anchor>,
+    /// Links (by index) tested after it, with the places of their anchors.
+    pub(crate) links: Vec<(usize, Option<usize>)>,
     /// Conditions (by index) tested after it.
     pub(crate) tests: Vec<usize>,
     /// Candidates expected in a whole search.
     pub(crate) candidates: f64,
     /// How many of them are expected to pass.
     pub(crate) passing: f64,
+}
+
+/// A node of which a step looks at the edges that go one way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Anchor {
+    pub(crate) way: Way,
+    pub(crate) slot: usize,
+    /// Which of the slots it is that the step before binds, if it is one of them.
+    pub(crate) fresh: Option<usize>,
+}
+
+impl Anchor {
+    pub(crate) fn of(way: Way, slot: usize) -> Self {
+        let fresh = None;
+        Self { way, slot, fresh }
+    }
 }
 
 /// How a query is searched for, some of its slots given.
@@ -97,7 +120,8 @@ pub(crate) fn plan(query: &Query, statistics: &Statistics, given: &[usize]) -> P
             bound[slot] = true;
         }
         plan.cost += extension.cost;
-        plan.steps.push(planner.step(&extension, &before, &bound));
+        let step = planner.step(&extension, &before, &bound, plan.steps.last());
+        plan.steps.push(step);
     }
     plan
 }
@@ -330,7 +354,13 @@ impl Planner<'_> {
         (0..self.query.tests.len()).filter(ready)
     }
 
-    fn step(&self, extension: &Extension, before: &[bool], bound: &[bool]) -> Step {
+    fn step(
+        &self,
+        extension: &Extension,
+        before: &[bool],
+        bound: &[bool],
+        last: Option<&Step>,
+    ) -> Step {
         let Extension { source, binds, .. } = *extension;
         let domains = &self.query.domains;
         let others = binds.map(|slot| {
@@ -339,11 +369,35 @@ impl Planner<'_> {
                 .filter(|&other| before[other] && domains[other].meets(&domains[slot]))
                 .collect()
         });
+        let anchor = |(way, slot)| Anchor {
+            way,
+            slot,
+            fresh: last.and_then(|last| last.binds.iter().position(|bound| *bound == Some(slot))),
+        };
+        let origin = source.origin(self.query);
+        let mut anchors: Vec<Anchor> = origin.map(anchor).into_iter().collect();
+        let links = self.links_between(bound, before, source.link());
+        let links = links.map(|index| {
+            let Link { from, to, .. } = self.query.links[index];
+            // Either end knows, but what the step has just bound was never looked at.
+            let (way, slot) = if binds.contains(&Some(from)) {
+                (Way::In, to)
+            } else {
+                (Way::Out, from)
+            };
+            let known = before[slot].then(|| {
+                anchors.push(anchor((way, slot)));
+                anchors.len() - 1
+            });
+            (index, known)
+        });
         Step {
             source,
+            label: source.link().and_then(|link| self.query.links[link].label),
             binds,
             others,
-            links: self.links_between(bound, before, source.link()).collect(),
+            links: links.collect(),
+            anchors,
             tests: self.tests_of(bound, Some(before)).collect(),
             candidates: extension.candidates,
             passing: extension.passing,
@@ -355,6 +409,12 @@ impl Step {
     /// Whether nothing is tested after it.
     pub(crate) fn is_free(&self) -> bool {
         self.links.is_empty() && self.tests.is_empty()
+    }
+
+    /// Whether it follows the links of a node that was bound before it.
+    #[inline]
+    pub(crate) fn follows(&self) -> bool {
+        matches!(self.source, Source::Out { .. } | Source::In { .. })
     }
 
     /// Puts a candidate into its slots.
@@ -369,6 +429,15 @@ impl Step {
 }
 
 impl Source {
+    /// The slot of the node whose links it follows, if it does, and which way.
+    fn origin(self, query: &Query) -> Option<(Way, usize)> {
+        match self {
+            Self::Out { link } => Some((Way::Out, query.links[link].from)),
+            Self::In { link } => Some((Way::In, query.links[link].to)),
+            _ => None,
+        }
+    }
+
     /// The link that it follows.
     pub(crate) fn link(self) -> Option<usize> {
         match self {

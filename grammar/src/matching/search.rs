@@ -1,42 +1,68 @@
-//! Backtracking along a plan.
+//! Backtracking along a plan, some partial matches at a time.
 //!
 //! Guarantee: every match comes exactly once, in an order that the graph and the plan alone
 //! determine; matches are injective.
 
 use super::MatchError;
-use super::ahead::Ahead;
-use super::candidates::{Candidate, Candidates};
+use super::ahead::Ends;
+use super::candidates::Candidates;
 use super::environment::{Environment, Interrupt, node};
-use super::host::{Host, Way};
-use super::plan::{Plan, Source, Step, plan};
-use super::program::{Link, Slot};
-use super::query::{Problem, Query};
+use super::frame::Frame;
+use super::host::Host;
+use super::plan::{Plan, plan};
+use super::query::Problem;
 use super::statistics::Statistics;
 use crate::Binding;
-use dsr::{EdgeKey, NodeId, ReadError, Snapshot, TypeId};
+use dsr::{NodeId, ReadError, Snapshot};
 use std::fmt;
 use std::sync::Arc;
 
-/// So many candidates are read together where they come from no link.
-const TOGETHER: usize = 32;
+/// A step finds about so many partial matches together, if they are asked for: so many can be looked at
+/// while the memory of the last is on its way.
+const WIDEST: usize = 32;
+/// So many it finds at first.
+const NARROWEST: usize = 8;
+/// In no row's place: none is in the slots.
+const NONE: usize = usize::MAX;
 
 /// A search under way.
+///
+/// Each step keeps some of what it found, and finds more for the rows of the step before it, one after the
+/// other, where all of those were gone on from. The first time it looks for a few only, then for twice as
+/// many each time, so that who wants but the first match hardly waits for others.
 #[derive(Debug)]
 pub(crate) struct Search<'h, H: Host> {
     host: &'h H,
     problem: Problem,
     plan: Arc<Plan>,
-    /// By step, what was read of its candidates.
-    ahead: Vec<Ahead>,
-    /// By step, where its candidates come from, if not along a link.
-    others: Vec<Option<Candidates<'h, H>>>,
-    /// The step that is tried.
-    depth: usize,
-    /// Whether nothing is tested after the last step.
-    free: bool,
-    /// By step, how many candidates there were, and how many of them passed.
-    seen: Vec<[u64; 2]>,
+    levels: Vec<Level<'h, H>>,
     state: State,
+}
+
+/// What one step has found.
+struct Level<'h, H: Host + 'h> {
+    rows: Vec<Ends>,
+    /// By row, the row before it that it goes on from.
+    parents: Vec<usize>,
+    /// The first row that was not yet gone on from.
+    next: usize,
+    /// The row that is in the slots.
+    bound: usize,
+    /// The row before it for which it looks, and from where on there may be more for it.
+    parent: usize,
+    more: Option<NodeId>,
+    /// What it finds for that, if not along a link.
+    other: Option<Candidates<'h, H>>,
+    /// The edges at the step's anchors, for the rows before it from one on up to another.
+    edges: Vec<Option<H::Adjacency<'h>>>,
+    found_from: usize,
+    found_to: usize,
+    /// So many rows are wanted the next time.
+    width: usize,
+    /// What was in the way of more.
+    interrupt: Option<Interrupt>,
+    /// How many candidates there were, and how many of them passed.
+    seen: [u64; 2],
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,17 +72,42 @@ enum State {
     Done,
 }
 
+impl<H: Host> Level<'_, H> {
+    fn new() -> Self {
+        Self {
+            rows: Vec::new(),
+            parents: Vec::new(),
+            next: 0,
+            bound: NONE,
+            parent: 0,
+            more: None,
+            other: None,
+            edges: Vec::new(),
+            found_from: 0,
+            found_to: 0,
+            width: NARROWEST,
+            interrupt: None,
+            seen: [0; 2],
+        }
+    }
+}
+
+impl<H: Host> fmt::Debug for Level<'_, H> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let left = self.rows.get(self.next..);
+        f.debug_struct("Level")
+            .field("left", &left)
+            .finish_non_exhaustive()
+    }
+}
+
 impl<'h, H: Host> Search<'h, H> {
     /// A search by a plan that was made for the problem's query and given slots.
     pub(crate) fn new(host: &'h H, problem: Problem, plan: Arc<Plan>) -> Self {
         Self {
             host,
             problem,
-            ahead: vec![Ahead::default(); plan.steps.len()],
-            others: plan.steps.iter().map(|_| None).collect(),
-            depth: 0,
-            free: plan.steps.last().is_some_and(Step::is_free),
-            seen: vec![[0; 2]; plan.steps.len()],
+            levels: plan.steps.iter().map(|_| Level::new()).collect(),
             plan,
             state: State::Fresh,
         }
@@ -66,16 +117,23 @@ impl<'h, H: Host> Search<'h, H> {
     /// is none any more.
     #[inline]
     pub(crate) fn advance(&mut self) -> Result<bool, Interrupt> {
-        if self.free
-            && self.state == State::Running
-            && let (Some(step), Some(ahead)) = (self.plan.steps.last(), self.ahead.last_mut())
-            && let Some(ends) = ahead.next()
-            && let Some([_, passed]) = self.seen.last_mut()
+        self.problem.environment.renew();
+        let steps = self.levels.len();
+        if let Some(last) = self.levels.last_mut()
+            && last.next < last.rows.len()
         {
+            let row = last.next;
+            last.next += 1;
             let environment = &mut self.problem.environment;
-            environment.renew();
-            step.bind(ends, environment);
-            *passed += 1;
+            if let Some(step) = self.plan.steps.last()
+                && last.bound != NONE
+                && last.parents[row] == last.parents[last.bound]
+            {
+                last.bound = row;
+                step.bind(last.rows[row], environment);
+            } else {
+                bind(&mut self.levels, &self.plan, (steps - 1, row), environment);
+            }
             return Ok(true);
         }
         let found = self.try_advance();
@@ -86,69 +144,235 @@ impl<'h, H: Host> Search<'h, H> {
     }
 
     fn try_advance(&mut self) -> Result<bool, Interrupt> {
+        let Some(last) = self.levels.len().checked_sub(1) else {
+            return Ok(self.state == State::Fresh && self.begin()?);
+        };
+        let goes_on = match self.state {
+            State::Done => false,
+            State::Fresh => self.begin()?,
+            State::Running => true,
+        };
+        if !goes_on || !self.refill(last)? {
+            return Ok(false);
+        }
+        self.levels[last].next = 1;
+        bind(
+            &mut self.levels,
+            &self.plan,
+            (last, 0),
+            &mut self.problem.environment,
+        );
+        Ok(true)
+    }
+
+    fn begin(&mut self) -> Result<bool, Interrupt> {
+        self.state = State::Running;
+        let Problem { query, environment } = &mut self.problem;
+        let frame = Frame {
+            host: self.host,
+            query,
+            plan: &self.plan,
+        };
+        if !frame.given_holds(environment)? {
+            return Ok(false);
+        }
+        if let (Some(first), Some(step)) = (self.levels.first_mut(), self.plan.steps.first()) {
+            first.other = frame.open(step);
+            first.more = Some(NodeId(0));
+            self.find_edges(0)?;
+        }
+        Ok(true)
+    }
+
+    /// Finds the next rows of a step, all before them having been gone on from; `false` where there are
+    /// no more.
+    fn refill(&mut self, depth: usize) -> Result<bool, Interrupt> {
+        let level = &mut self.levels[depth];
+        if let Some(interrupt) = level.interrupt.take() {
+            return Err(interrupt);
+        }
+        level.rows.clear();
+        level.parents.clear();
+        level.rows.reserve(WIDEST);
+        level.parents.reserve(WIDEST);
+        (level.next, level.bound) = (0, NONE);
+        let width = level.width;
+        level.width = (2 * width).min(WIDEST);
+        while self.levels[depth].rows.len() < width {
+            if self.levels[depth].more.is_none() {
+                let Some(above) = depth.checked_sub(1) else {
+                    break;
+                };
+                if self.levels[above].next == self.levels[above].rows.len() {
+                    // What was found leads to rows that are kept there.
+                    if !self.levels[depth].rows.is_empty() {
+                        break;
+                    }
+                    if !self.refill(above)? {
+                        return Ok(false);
+                    }
+                    self.levels[depth].found_to = 0;
+                }
+                self.turn_to_next(depth)?;
+            }
+            if let Err(interrupt) = self.read_on(depth, width) {
+                let level = &mut self.levels[depth];
+                level.rows.truncate(level.parents.len());
+                if level.rows.is_empty() {
+                    return Err(interrupt);
+                }
+                level.interrupt = Some(interrupt);
+                break;
+            }
+        }
+        Ok(!self.levels[depth].rows.is_empty())
+    }
+
+    /// Turns a step to the next row before it.
+    fn turn_to_next(&mut self, depth: usize) -> Result<(), Interrupt> {
+        let above = &mut self.levels[depth - 1];
+        let parent = above.next;
+        above.next += 1;
+        let level = &mut self.levels[depth];
+        level.parent = parent;
+        level.more = Some(NodeId(0));
+        if parent >= level.found_to {
+            self.find_edges(depth)?;
+        }
+        Ok(())
+    }
+
+    /// Finds the edges at a step's anchors for some of the rows before it, from the one on that it is turned
+    /// to; and only then has them fetched, all at once.
+    fn find_edges(&mut self, depth: usize) -> Result<(), Interrupt> {
         let Self {
             host,
             problem: Problem { query, environment },
             plan,
-            ahead,
-            others,
-            depth,
-            seen,
-            state,
-            free: _,
+            levels,
+            ..
+        } = self;
+        let host: &'h H = host;
+        let frame = Frame { host, query, plan };
+        let step = &plan.steps[depth];
+        let (above, below) = levels.split_at_mut(depth);
+        let Some(level) = below.first_mut() else {
+            return Ok(());
+        };
+        level.edges.clear();
+        level.edges.reserve(WIDEST);
+        level.found_from = level.parent;
+        level.found_to = level.parent + 1;
+        let Some(above_it) = above.last() else {
+            for anchor in &step.anchors {
+                level.edges.push(frame.edges(*anchor, environment)?);
+            }
+            return Ok(());
+        };
+        if step.follows() {
+            level.found_to = above_it.rows.len().min(level.parent + level.width);
+        } else {
+            level.other = frame.open(step);
+        }
+        if step.anchors.iter().all(|anchor| anchor.fresh.is_some()) {
+            for ends in &above_it.rows[level.parent..level.found_to] {
+                for anchor in &step.anchors {
+                    let node = ends[anchor.fresh.unwrap_or_default()];
+                    level.edges.push(Some(host.adjacency(anchor.way, node)?));
+                }
+            }
+        } else {
+            for row in level.parent..level.found_to {
+                bind(above, plan, (depth - 1, row), environment);
+                for anchor in &step.anchors {
+                    level.edges.push(frame.edges(*anchor, environment)?);
+                }
+            }
+        }
+        if level.edges.len() > 1 {
+            for edges in level.edges.iter().flatten() {
+                host.fetch(*edges);
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads candidates for the row that a step is turned to and for those after it whose edges were found,
+    /// until there are `width` that pass, and keeps these.
+    fn read_on(&mut self, depth: usize, width: usize) -> Result<(), Interrupt> {
+        let last = depth + 1 == self.levels.len();
+        let Self {
+            host,
+            problem: Problem { query, environment },
+            plan,
+            levels,
+            ..
         } = self;
         let frame = Frame {
             host: *host,
             query,
             plan,
         };
-        environment.renew();
-        let mut slots = Slots { environment, ahead };
-        match state {
-            State::Done => return Ok(false),
-            State::Running => {}
-            State::Fresh => {
-                *state = State::Running;
-                if !frame.given_holds(&mut slots)? {
-                    return Ok(false);
-                }
-                if plan.steps.is_empty() {
-                    return Ok(true);
-                }
-                others[0] = frame.open(0, &mut slots);
-            }
-        }
+        let step = &plan.steps[depth];
+        let (above, below) = levels.split_at_mut(depth);
+        let Some(level) = below.first_mut() else {
+            return Ok(());
+        };
+        let is_free = step.is_free();
+        let anchors = step.anchors.len();
         loop {
-            let Some(step) = plan.steps.get(*depth) else {
-                return Ok(false);
+            let Some(from) = level.more.take() else {
+                return Ok(());
             };
-            if let Some(ends) = slots.ahead[*depth].next() {
-                step.bind(ends, slots.environment);
-                if !frame.passes(step, &mut slots)? {
-                    continue;
+            if let Some(before) = depth.checked_sub(1)
+                && !(is_free && step.others[0].is_empty())
+            {
+                bind(above, plan, (before, level.parent), environment);
+            }
+            let at = (level.parent - level.found_from) * anchors;
+            let found = level.edges.get(at..at + anchors).unwrap_or(&[]);
+            let before = level.rows.len();
+            let origin = found.first().copied().flatten();
+            let rows = (&mut level.rows, &mut *environment);
+            let (read, more) = frame.read(step, origin, from, &mut level.other, rows)?;
+            level.more = more;
+            level.seen[0] += read;
+            if !is_free {
+                let mut kept = before;
+                for row in before..level.rows.len() {
+                    let ends = level.rows[row];
+                    step.bind(ends, environment);
+                    if frame.passes(step, found, environment)? {
+                        level.rows[kept] = ends;
+                        kept += 1;
+                    }
                 }
-                seen[*depth][1] += 1;
-                if *depth + 1 == plan.steps.len() {
-                    return Ok(true);
+                level.rows.truncate(kept);
+            }
+            if level.rows.len() > before {
+                level.seen[1] += (level.rows.len() - before) as u64;
+                level.parents.resize(level.rows.len(), level.parent);
+                if last {
+                    environment.renew();
                 }
-                *depth += 1;
-                if let Some(other) = frame.open(*depth, &mut slots) {
-                    others[*depth] = Some(other);
-                }
-            } else if let Some(from) = slots.ahead[*depth].read_on() {
-                let (other, seen) = (&mut others[*depth], &mut seen[*depth][0]);
-                *seen += frame.read(*depth, from, other, &mut slots)?;
-            } else if let Some(before) = depth.checked_sub(1) {
-                *depth = before;
-            } else {
-                return Ok(false);
+            }
+            if level.more.is_some()
+                || level.rows.len() >= width
+                || level.parent + 1 >= level.found_to
+            {
+                return Ok(());
+            }
+            level.parent += 1;
+            level.more = Some(NodeId(0));
+            if let Some(above) = above.last_mut() {
+                above.next = level.parent + 1;
             }
         }
     }
 
     /// By step, how many candidates there were so far, and how many of them passed.
-    pub(crate) fn seen(&self) -> &[[u64; 2]] {
-        &self.seen
+    pub(crate) fn seen(&self) -> impl Iterator<Item = [u64; 2]> {
+        self.levels.iter().map(|level| level.seen)
     }
 
     /// The nodes of the match that [`Self::advance`] went to, by slot.
@@ -163,221 +387,23 @@ impl<'h, H: Host> Search<'h, H> {
     }
 }
 
-/// What a search fills.
-pub(crate) struct Slots<'s> {
-    pub(crate) environment: &'s mut Environment,
-    /// By step, what was read of its candidates.
-    pub(crate) ahead: &'s mut [Ahead],
-}
-
-/// What a search goes by.
-pub(crate) struct Frame<'h, 'p, H: Host> {
-    pub(crate) host: &'h H,
-    pub(crate) query: &'p Query,
-    pub(crate) plan: &'p Plan,
-}
-
-impl<'h, H: Host> Frame<'h, '_, H> {
-    /// Puts the first match into the slots, those that are given kept.
-    pub(crate) fn first(&self, slots: &mut Slots<'_>) -> Result<bool, Interrupt> {
-        Ok(self.given_holds(slots)? && self.descend(0, slots)?)
-    }
-
-    fn descend(&self, depth: usize, slots: &mut Slots<'_>) -> Result<bool, Interrupt> {
-        if depth == self.plan.steps.len() {
-            return Ok(true);
-        }
-        let step = &self.plan.steps[depth];
-        let mut other = self.open(depth, slots);
-        loop {
-            if let Some(ends) = slots.ahead[depth].next() {
-                step.bind(ends, slots.environment);
-                if self.passes(step, slots)? && self.descend(depth + 1, slots)? {
-                    return Ok(true);
-                }
-            } else if let Some(from) = slots.ahead[depth].read_on() {
-                self.read(depth, from, &mut other, slots)?;
-            } else {
-                return Ok(false);
-            }
-        }
-    }
-
-    /// What can be said of the slots that are bound from the start.
-    fn given_holds(&self, slots: &mut Slots<'_>) -> Result<bool, Interrupt> {
-        let Self { host, query, plan } = self;
-        for (index, &slot) in plan.given.iter().enumerate() {
-            let taken = slots.environment[slot];
-            let mut others = plan.given[..index].iter();
-            if others.any(|&other| slots.environment[other] == taken) {
-                return Ok(false);
-            }
-            let node = node(slots.environment, slot).map(|id| host.find(id));
-            let exact = node.transpose()?.flatten().map(|node| host.type_of(node));
-            if !exact.is_some_and(|exact| query.domains[slot].contains(exact)) {
-                return Ok(false);
-            }
-        }
-        for &link in &plan.links {
-            if !self.link_holds(&query.links[link], Way::Out, slots)? {
-                return Ok(false);
-            }
-        }
-        self.tests_hold(&plan.tests, slots)
-    }
-
-    /// Whether the links and conditions hold that are looked at after a step.
-    #[inline]
-    fn passes(&self, step: &Step, slots: &mut Slots<'_>) -> Result<bool, Interrupt> {
-        for &link in &step.links {
-            let link = &self.query.links[link];
-            // Either end knows, but what the step has just bound was never looked at.
-            let way = if step.binds[0] == Some(link.from) {
-                Way::In
-            } else {
-                Way::Out
-            };
-            if !self.link_holds(link, way, slots)? {
-                return Ok(false);
-            }
-        }
-        Ok(step.tests.is_empty() || self.tests_hold(&step.tests, slots)?)
-    }
-
-    fn tests_hold(&self, tests: &[usize], slots: &mut Slots<'_>) -> Result<bool, Interrupt> {
-        for &test in tests {
-            if !self.query.tests[test].holds(self.host, slots.environment)? {
-                return Ok(false);
-            }
-        }
-        Ok(true)
-    }
-
-    /// Whether the link is there, or is not where it must not be.
-    fn link_holds(&self, link: &Link, way: Way, slots: &Slots<'_>) -> Result<bool, ReadError> {
-        let [from, to] = [link.from, link.to].map(|slot| node(slots.environment, slot));
-        let (Some(from), Some(label), Some(to)) = (from, link.label, to) else {
-            return Ok(link.negated);
-        };
-        let there = match way {
-            Way::Out => self.host.has_end(way, from, label, to)?,
-            Way::In => self.host.has_end(way, to, label, from)?,
-        };
-        Ok(there != link.negated)
-    }
-
-    /// Begins a step; where it does not follow a link, what it finds comes back.
-    fn open(&self, depth: usize, slots: &mut Slots<'_>) -> Option<Candidates<'h, H>> {
-        let Self { host, query, .. } = *self;
-        slots.ahead[depth].begin();
-        Some(match self.plan.steps[depth].source {
-            Source::Out { .. } | Source::In { .. } => return None,
-            Source::Nodes { slot } => Candidates::members(host, query.domains[slot].types()),
-            Source::Edges { link } => match query.links[link].label {
-                Some(label) => Candidates::Edges(host.edges(label)),
-                None => Candidates::Nothing,
-            },
-            Source::Values { bound } => {
-                let bound = &query.bounds[bound];
-                Candidates::Indexed(host, host.by_value(bound.attribute, &bound.range))
-            }
-        })
-    }
-
-    /// Reads some candidates of a step ahead, those along a link from a node on, and keeps what is of the
-    /// right type and in no other slot; how many there were.
-    #[inline]
-    fn read(
-        &self,
-        depth: usize,
-        from: NodeId,
-        other: &mut Option<Candidates<'h, H>>,
-        slots: &mut Slots<'_>,
-    ) -> Result<u64, Interrupt> {
-        let step = &self.plan.steps[depth];
-        let read = match (step.source, other) {
-            (Source::Out { link }, _) => self.follow(Way::Out, link, depth, from, slots)?,
-            (Source::In { link }, _) => self.follow(Way::In, link, depth, from, slots)?,
-            (_, Some(other)) => self.take(other, depth, slots)?,
-            (_, None) => 0,
-        };
-        slots.environment.spend(read)?;
-        Ok(read)
-    }
-
-    fn follow(
-        &self,
-        way: Way,
-        link: usize,
-        depth: usize,
-        from: NodeId,
-        slots: &mut Slots<'_>,
-    ) -> Result<u64, ReadError> {
-        let Link {
-            from: source,
-            label,
-            to: target,
-            ..
-        } = self.query.links[link];
-        let (origin, slot) = match way {
-            Way::Out => (source, target),
-            Way::In => (target, source),
-        };
-        let (Some(origin), Some(label)) = (node(slots.environment, origin), label) else {
-            return Ok(0);
-        };
-        let (domain, others) = (&self.query.domains[slot], &self.plan.steps[depth].others[0]);
-        let (ahead, environment) = (&mut slots.ahead[depth], &*slots.environment);
-        let mut visited = 0;
-        let more = self.host.visit_ends(way, origin, label, from, |id, exact| {
-            visited += 1;
-            if domain.contains(exact) && !is_in(others, id, environment) {
-                ahead.push([id; 2]);
-            }
-        });
-        ahead.stopped_at(more?);
-        Ok(visited)
-    }
-
-    #[inline(never)]
-    fn take(
-        &self,
-        other: &mut Candidates<'h, H>,
-        depth: usize,
-        slots: &mut Slots<'_>,
-    ) -> Result<u64, ReadError> {
-        let step = &self.plan.steps[depth];
-        let (ahead, environment) = (&mut slots.ahead[depth], &*slots.environment);
-        let fits = |index: usize, (id, exact): (NodeId, TypeId)| {
-            step.binds[index].is_none_or(|slot| {
-                self.query.domains[slot].contains(exact)
-                    && !is_in(&step.others[index], id, environment)
-            })
-        };
-        let mut read = 0;
-        for candidate in other.take(TOGETHER) {
-            read += 1;
-            match candidate? {
-                Candidate::Node(id, exact) if fits(0, (id, exact)) => ahead.push([id; 2]),
-                Candidate::Edge(EdgeKey { from, to, .. }, [source, target])
-                    if from != to && fits(0, (from, source)) && fits(1, (to, target)) =>
-                {
-                    ahead.push([from, to]);
-                }
-                _ => {}
-            }
-        }
-        ahead.stopped_at((read == TOGETHER as u64).then_some(NodeId(0)));
-        Ok(read)
-    }
-}
-
-/// Whether one of the slots has the node.
+/// Puts a row into its slots, and the rows that it goes on from.
 #[inline]
-fn is_in(slots: &[usize], id: NodeId, environment: &Environment) -> bool {
-    slots
-        .iter()
-        .any(|&slot| environment[slot] == Slot::Node(id))
+fn bind<H: Host>(
+    levels: &mut [Level<'_, H>],
+    plan: &Plan,
+    (depth, mut row): (usize, usize),
+    environment: &mut Environment,
+) {
+    let upwards = levels[..=depth].iter_mut().zip(&plan.steps[..=depth]);
+    for (level, step) in upwards.rev() {
+        if level.bound == row {
+            return;
+        }
+        level.bound = row;
+        step.bind(level.rows[row], environment);
+        row = level.parents[row];
+    }
 }
 
 /// The matches of a rule or goal, found one at a time.

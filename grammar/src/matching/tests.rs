@@ -300,6 +300,49 @@ fn a_robot_is_followed_into_its_room_however_many_people_are_in_rooms() {
     assert_eq!(matches.count(), 1);
 }
 
+#[test]
+fn matches_by_the_thousand_come_once_each_in_order() {
+    // More starts, more ends of a node and more matches than are looked at together; some starts lead
+    // nowhere, some ends are excluded by a link that must not be there.
+    let names: Vec<String> = (0..90).map(|index| format!("n{index:02}")).collect();
+    let mut nodes = Vec::new();
+    let mut links: Vec<(&str, &str, &str)> = Vec::new();
+    for (index, name) in names.iter().enumerate() {
+        nodes.push((["robot", "room"][usize::from(index >= 40)], name.as_str()));
+        if index < 40 && index % 3 != 0 {
+            links.push((name, "in", &names[40 + index % 5]));
+        }
+        for from in (40..43).filter(|from| index >= 40 && *from != index) {
+            links.push((&names[from], "connected", name));
+            if (index + from) % 4 == 0 {
+                links.push((name, "blocks", &names[from]));
+            }
+        }
+    }
+    let floor = graph(&nodes, &links);
+    let snapshot = floor.snapshot();
+    let grammar = rule("{ r:robot a:room b:room r->a(in) a->b(connected) b->a(blocks)* } => { }");
+    let found = grammar.matches(&snapshot, &grammar.rules[0], &Binding::new());
+    let found: Vec<Binding> = found.unwrap().map(Result::unwrap).collect();
+    let mut expected = Vec::new();
+    for robot in (0..40).filter(|robot| robot % 3 != 0 && robot % 5 < 3) {
+        let room = 40 + robot % 5;
+        for next in (40..90).filter(|next| *next != room && (next + room) % 4 != 0) {
+            let nodes = [("r", robot), ("a", room), ("b", next)];
+            let nodes = nodes.map(|(variable, node)| (variable.to_owned(), names[node].clone()));
+            expected.push(Assignment::from_iter(nodes));
+        }
+    }
+    assert!(expected.len() > 500);
+    let names: Vec<Assignment> = found.iter().map(|found| named(&snapshot, found)).collect();
+    assert_eq!(names, expected);
+    for few in [1, 7, 8, 9, 100] {
+        let some = grammar.matches(&snapshot, &grammar.rules[0], &Binding::new());
+        let some: Vec<Binding> = some.unwrap().take(few).map(Result::unwrap).collect();
+        assert_eq!(some, found[..few]);
+    }
+}
+
 /// A crowd of nodes `p0`, `p1`, ... of type `person`, each with the number as its attribute `n`,
 /// which has an index.
 fn numbered(count: i64) -> dsr::Graph {

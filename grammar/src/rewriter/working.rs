@@ -245,6 +245,7 @@ impl Iterator for Ids<'_> {
 impl Host for WorkingGraph {
     /// The id of one that is there.
     type Node<'a> = NodeId;
+    type Adjacency<'a> = &'a [(LabelId, NodeId)];
     type Ids<'a> = Ids<'a>;
     type Ends<'a> = Ends<'a>;
     type Edges<'a> = Box<dyn Iterator<Item = Result<(EdgeKey, [TypeId; 2]), ReadError>> + 'a>;
@@ -262,14 +263,19 @@ impl Host for WorkingGraph {
             .map_or(TypeId(u16::MAX), |entry| entry.exact)
     }
 
+    #[inline]
+    fn adjacency(&self, way: Way, of: NodeId) -> Result<&[(LabelId, NodeId)], ReadError> {
+        Ok(self.ends(way, of))
+    }
+
+    fn fetch(&self, _: &[(LabelId, NodeId)]) {}
+
     fn has_end(
         &self,
-        way: Way,
-        of: NodeId,
+        ends: &[(LabelId, NodeId)],
         label: LabelId,
         other: NodeId,
     ) -> Result<bool, ReadError> {
-        let ends = self.ends(way, of);
         Ok(ends.binary_search(&(label, other)).is_ok())
     }
 
@@ -303,13 +309,11 @@ impl Host for WorkingGraph {
 
     fn visit_ends(
         &self,
-        way: Way,
-        of: NodeId,
+        ends: &[(LabelId, NodeId)],
         label: LabelId,
         from: NodeId,
         mut visit: impl FnMut(NodeId, TypeId),
     ) -> Result<Option<NodeId>, ReadError> {
-        let ends = self.ends(way, of);
         let first = ends.partition_point(|end| *end < (label, from));
         let mut ends = ends[first..].iter();
         let mut ends = ends.by_ref().take_while(|(other, _)| *other == label);
@@ -324,9 +328,33 @@ impl Host for WorkingGraph {
         nodes.map_or(Ids::Nothing, |nodes| Ids::Members(nodes.iter()))
     }
 
+    fn visit_ids(
+        &self,
+        ids: &mut Ids<'_>,
+        mut visit: impl FnMut(NodeId),
+    ) -> Result<bool, ReadError> {
+        let next = ids.next().transpose()?;
+        if let Some(id) = next {
+            visit(id);
+        }
+        Ok(next.is_some())
+    }
+
     fn edges(&self, label: LabelId) -> Self::Edges<'_> {
         let edges = self.edges().filter(move |key| key.label == label);
         Box::new(edges.map(|key| Ok((key, [key.from, key.to].map(|end| self.type_of(end))))))
+    }
+
+    fn visit_edges(
+        &self,
+        edges: &mut Self::Edges<'_>,
+        mut visit: impl FnMut(EdgeKey, [TypeId; 2]),
+    ) -> Result<bool, ReadError> {
+        let next = edges.next().transpose()?;
+        if let Some((key, types)) = next {
+            visit(key, types);
+        }
+        Ok(next.is_some())
     }
 
     fn by_value(&self, attribute: AttributeId, range: &ValueRange) -> Ids<'_> {

@@ -65,11 +65,17 @@ fn types_at_ends(snapshot: &Snapshot, label: LabelId) -> Result<(), ReadError> {
         assert!(targets.contains(&(key.to, to.type_id())));
         let sources = to.typed_sources_of(label).collect::<Result<Vec<_>, _>>()?;
         assert!(sources.contains(&(key.from, from.type_id())));
-        let pieces = in_pieces(|from, visit| snapshot.visit_targets(key.from, label, from, visit))?;
+        let pieces =
+            in_pieces(|next, visit| snapshot.edges_from(key.from)?.visit(label, next, visit))?;
         assert_eq!(pieces.concat(), targets);
-        let pieces = in_pieces(|from, visit| snapshot.visit_sources(key.to, label, from, visit))?;
+        let pieces =
+            in_pieces(|next, visit| snapshot.edges_into(key.to)?.visit(label, next, visit))?;
         assert_eq!(pieces.concat(), sources);
     }
+    let one_by_one = snapshot.typed_edges_of_label(label);
+    let (mut edges, mut visited) = (snapshot.typed_edges_of_label(label), Vec::new());
+    while edges.visit_some(|key, types| visited.push((key, types)))? {}
+    assert_eq!(visited, one_by_one.collect::<Result<Vec<_>, _>>()?);
     Ok(())
 }
 
@@ -108,14 +114,17 @@ fn the_edges_of_a_hub_are_visited_in_pieces() {
     for (label, count) in [("before", 72), ("on", 500), ("then", 72)] {
         let label = snapshot.schema().find_label(label).unwrap();
         types_at_ends(&snapshot, label).unwrap();
-        let pieces = in_pieces(|from, visit| snapshot.visit_targets(hub, label, from, visit));
+        let pieces = in_pieces(|from, visit| snapshot.edges_from(hub)?.visit(label, from, visit));
         let pieces = pieces.unwrap();
         assert_eq!(pieces.concat().len(), count);
         assert!(pieces.iter().all(|piece| piece.len() <= 32), "{pieces:?}");
     }
     let on = snapshot.schema().find_label("on").unwrap();
-    let nobody = in_pieces(|from, visit| snapshot.visit_targets(NodeId(9999), on, from, visit));
-    assert_eq!(nobody.unwrap(), [[]]);
+    let nobody = snapshot.edges_from(NodeId(9999)).unwrap();
+    nobody.fetch();
+    let visited = in_pieces(|from, visit| nobody.visit(on, from, visit));
+    assert_eq!(visited.unwrap(), [[]]);
+    assert!(!nobody.has(on, hub).unwrap());
 }
 
 /// The same, counted.

@@ -8,11 +8,12 @@ mod trigger;
 
 use super::MatchError;
 use super::environment::{Environment, Interrupt, SEARCH_LIMIT};
+use super::frame::{Frame, Slots};
 use super::plan::Plan;
 use super::planned::Planned;
 use super::program::Slot;
 use super::query::Problem;
-use super::search::{Frame, Search, Slots};
+use super::search::Search;
 use crate::{Binding, Grammar, Name, Rule};
 use dsr::{
     Change, EdgeChange, Epoch, LabelId, NodeChange, NodeId, ReadError, Schema, Snapshot, Touch,
