@@ -82,6 +82,14 @@ pub enum Problem {
     /// A bracket that closes nothing.
     #[error("`{0}` closes nothing")]
     Stray(String),
+    /// A word that belongs before a rule's name and stands after it.
+    #[error("`{word}` stands before a rule's name, not here")]
+    Misplaced {
+        /// The word.
+        word: String,
+        /// The rule.
+        rule: String,
+    },
     /// A number outside of what is allowed.
     #[error("{what} must be {range}, not {found}")]
     OutOfRange {
@@ -304,6 +312,7 @@ impl Problem {
             Self::NotGiven { .. } => {
                 Some("name it, or `agent(NAME)`, under `rules` in the manifest".to_owned())
             }
+            Self::Misplaced { word, rule } => Some(format!("write `{word} {rule} : ...`")),
             Self::Stray(_) => Some("remove it, or look for a missing opening bracket".to_owned()),
             Self::Deleted { .. } => {
                 Some("keep the node on the right side, or leave the effect out".to_owned())

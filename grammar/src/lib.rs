@@ -108,6 +108,6 @@ pub use rule::{
     Arithmetic, AttributePath, Comparison, Condition, Effect, Expression, Kind, Literal, Pattern,
     PatternEdge, PatternNode, Rule,
 };
-pub use sound::{Part, Region, Sound};
+pub use sound::{Part, Region, Sound, Unsound};
 pub use source::{Name, SourceFile, Span};
 pub use unfold::{OPTIONAL_LIMIT, Unfolded, UnfoldedStep};

@@ -251,7 +251,31 @@ fn rules_beside_a_broken_one_are_used_and_the_broken_one_is_told() {
         text.replace("(room : thing)", "(room thing"),
     )
     .unwrap();
-    assert_eq!(rules(&folder, "match", "a.aggl", &one).0, 2);
+    let (code, _, err) = rules(&folder, "match", "a.aggl", &one);
+    assert_eq!(code, 2);
+    assert!(
+        err.contains("no rule can be used, because every rule"),
+        "{err}"
+    );
+    let rest = RULES.rsplit_once("===").unwrap();
+    let missing = format!(
+        "{}===\ninclude(no.aggl)\n{}{}",
+        rest.0,
+        rest.1,
+        broken.replace("robto", "tram")
+    );
+    fs::write(folder.path("a.aggl"), missing).unwrap();
+    let (code, out, err) = rules(&folder, "match", "a.aggl", &one);
+    assert_eq!(code, 0, "{err}");
+    assert!(out.contains("changeRoom"), "{out}");
+    assert!(
+        err.contains("warning: without `bad`, whose types may be declared there\n"),
+        "{err}"
+    );
+    let wrong = ["--world", "--rule", "changeRoom", "--bind", "a=rob"];
+    let (code, out, _) = rules(&folder, "apply", "a.aggl", &wrong);
+    assert_eq!(code, 1, "{out}");
+    assert!(out.contains("not a room"), "{out}");
 }
 
 #[test]

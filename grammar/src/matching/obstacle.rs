@@ -4,10 +4,13 @@
 
 use super::environment::{CHOICE_LIMIT, Environment, node};
 use super::evaluate::is_there;
+use super::host::Way;
 use super::program::Compiler;
-use super::{MatchError, Problem, conjuncts};
-use crate::{AttributePath, Condition, Expression, Grammar, Name, PatternEdge, PatternNode};
-use dsr::{NodeId, ReadError, Snapshot, Value};
+use super::{MatchDomain, MatchError, Problem, conjuncts};
+use crate::{
+    AttributePath, Binding, Condition, Expression, Grammar, Name, PatternEdge, PatternNode, Rule,
+};
+use dsr::{LabelId, NodeId, ReadError, Snapshot, Value};
 use std::fmt;
 
 /// A variable and the node that it is bound to.
@@ -90,6 +93,18 @@ pub enum Obstacle {
         /// The node it should enter.
         to: End,
     },
+    /// A node has no link of a label to any node of the type, or from any.
+    #[error("{node} has no link `{label}` {way} a {expected}")]
+    NoneLinked {
+        /// The node.
+        node: End,
+        /// The label.
+        label: String,
+        /// `to` or `from`.
+        way: &'static str,
+        /// The pattern's type at the other end.
+        expected: String,
+    },
     /// A starred link of the pattern is there.
     #[error("{from} has a link `{label}` to {to}, which must not be")]
     StarredLink {
@@ -130,6 +145,63 @@ pub(crate) fn end(snapshot: &Snapshot, variable: &str, id: NodeId) -> Result<End
 }
 
 impl Grammar {
+    /// What the nodes of a partial binding alone keep from matching, in the order of the rule: that they
+    /// are of other types, the same, or not linked as they should be, to each other or to any node of a
+    /// type. `None` where each of that is as it should be, though perhaps not all at once.
+    ///
+    /// # Errors
+    /// [`MatchError`], as for [`Self::matches`].
+    pub fn partial_obstacle(
+        &self,
+        snapshot: &Snapshot,
+        rule: &Rule,
+        partial: &Binding,
+    ) -> Result<Option<Obstacle>, MatchError> {
+        let problem = self.rule_problem(snapshot, rule, partial)?;
+        let nodes: Vec<&PatternNode> = rule.bound_nodes().collect();
+        for (slot, pattern) in nodes.iter().enumerate() {
+            if node(&problem.environment, slot).is_some()
+                && let Some(obstacle) = wrong_node(snapshot, &problem, &nodes, (slot, pattern))?
+            {
+                return Ok(Some(obstacle));
+            }
+        }
+        let Problem { query, environment } = &problem;
+        for (edge, link) in rule.left.edges.iter().zip(&query.links) {
+            let ends = [link.from, link.to].map(|slot| node(environment, slot));
+            if let [Some(from), Some(to)] = ends {
+                if is_there(snapshot, link, environment)? == link.negated {
+                    let ends = [
+                        end(snapshot, &edge.from, from)?,
+                        end(snapshot, &edge.to, to)?,
+                    ];
+                    return Ok(Some(wrong_link(edge, ends)));
+                }
+                continue;
+            }
+            let (way, bound, variable, other, slot) = match ends {
+                [Some(from), None] => (Way::Out, from, &edge.from, &edge.to, link.to),
+                [None, Some(to)] => (Way::In, to, &edge.to, &edge.from, link.from),
+                _ => continue,
+            };
+            if link.negated || is_linked(snapshot, (way, bound), link.label, &query.domains[slot])?
+            {
+                continue;
+            }
+            let expected = nodes.iter().find(|node| node.variable == *other);
+            return Ok(Some(Obstacle::NoneLinked {
+                node: end(snapshot, variable, bound)?,
+                label: edge.label.to_string(),
+                way: match way {
+                    Way::Out => "to",
+                    Way::In => "from",
+                },
+                expected: expected.map_or_else(String::new, |node| node.type_name.to_string()),
+            }));
+        }
+        Ok(None)
+    }
+
     /// The first thing of a fully bound problem that does not hold.
     pub(crate) fn explain(
         &self,
@@ -152,14 +224,11 @@ impl Grammar {
             else {
                 continue;
             };
-            let from = end(snapshot, &edge.from, from)?;
-            let to = end(snapshot, &edge.to, to)?;
-            let label = edge.label.to_string();
-            return Ok(Some(if link.negated {
-                Obstacle::StarredLink { from, label, to }
-            } else {
-                Obstacle::MissingLink { from, label, to }
-            }));
+            let ends = [
+                end(snapshot, &edge.from, from)?,
+                end(snapshot, &edge.to, to)?,
+            ];
+            return Ok(Some(wrong_link(edge, ends)));
         }
         let conditions = condition.into_iter().flat_map(conjuncts);
         for (condition, test) in conditions.zip(&query.tests) {
@@ -181,6 +250,38 @@ impl Grammar {
     }
 }
 
+/// A link that should be there, or should not, between two nodes.
+fn wrong_link(edge: &PatternEdge, [from, to]: [End; 2]) -> Obstacle {
+    let label = edge.label.to_string();
+    if edge.negated {
+        Obstacle::StarredLink { from, label, to }
+    } else {
+        Obstacle::MissingLink { from, label, to }
+    }
+}
+
+/// Whether a node has a link of the label to, or from, some node of these types.
+fn is_linked(
+    snapshot: &Snapshot,
+    (way, node): (Way, NodeId),
+    label: Option<LabelId>,
+    domain: &MatchDomain,
+) -> Result<bool, ReadError> {
+    let (Some(label), Some(node)) = (label, snapshot.find_node(node)?) else {
+        return Ok(false);
+    };
+    let ends = match way {
+        Way::Out => node.typed_targets_of(label),
+        Way::In => node.typed_sources_of(label),
+    };
+    for end in ends {
+        if domain.contains(end?.1) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
 /// What is wrong with the bound nodes themselves.
 fn bound_nodes(
     snapshot: &Snapshot,
@@ -188,32 +289,45 @@ fn bound_nodes(
     nodes: &[&PatternNode],
 ) -> Result<Option<Obstacle>, MatchError> {
     for (slot, pattern) in nodes.iter().enumerate() {
-        let variable = &pattern.variable;
-        let Some(id) = node(&problem.environment, slot) else {
-            return Ok(Some(Obstacle::Unbound {
-                variable: variable.to_string(),
-            }));
-        };
-        let this = end(snapshot, variable, id)?;
-        let Some(found) = snapshot.find_node(id)? else {
-            return Ok(Some(Obstacle::NoNode { node: this }));
-        };
-        if !problem.query.domains[slot].contains(found.type_id()) {
-            let (found, expected) = (found.type_name().to_owned(), pattern.type_name.to_string());
-            return Ok(Some(Obstacle::WrongType {
-                node: this,
-                found,
-                expected,
-            }));
+        if let Some(obstacle) = wrong_node(snapshot, problem, nodes, (slot, pattern))? {
+            return Ok(Some(obstacle));
         }
-        for (other, earlier) in nodes.iter().enumerate().take(slot) {
-            if node(&problem.environment, other) == Some(id) {
-                let first = end(snapshot, &earlier.variable, id)?;
-                return Ok(Some(Obstacle::Shared {
-                    first,
-                    second: this,
-                }));
-            }
+    }
+    Ok(None)
+}
+
+/// What is wrong with the node of one slot, beside those of the slots before it.
+fn wrong_node(
+    snapshot: &Snapshot,
+    problem: &Problem,
+    nodes: &[&PatternNode],
+    (slot, pattern): (usize, &PatternNode),
+) -> Result<Option<Obstacle>, MatchError> {
+    let variable = &pattern.variable;
+    let Some(id) = node(&problem.environment, slot) else {
+        return Ok(Some(Obstacle::Unbound {
+            variable: variable.to_string(),
+        }));
+    };
+    let this = end(snapshot, variable, id)?;
+    let Some(found) = snapshot.find_node(id)? else {
+        return Ok(Some(Obstacle::NoNode { node: this }));
+    };
+    if !problem.query.domains[slot].contains(found.type_id()) {
+        let (found, expected) = (found.type_name().to_owned(), pattern.type_name.to_string());
+        return Ok(Some(Obstacle::WrongType {
+            node: this,
+            found,
+            expected,
+        }));
+    }
+    for (other, earlier) in nodes.iter().enumerate().take(slot) {
+        if node(&problem.environment, other) == Some(id) {
+            let first = end(snapshot, &earlier.variable, id)?;
+            return Ok(Some(Obstacle::Shared {
+                first,
+                second: this,
+            }));
         }
     }
     Ok(None)

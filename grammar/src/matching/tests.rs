@@ -223,6 +223,49 @@ fn obstacles_are_told_in_words() {
 }
 
 #[test]
+fn what_is_bound_already_is_told_of_where_it_keeps_a_rule_from_matching() {
+    let (centre, grammar) = (care_centre(), read(CARE));
+    let snapshot = centre.snapshot();
+    let rule = grammar.rule("changeRoom").unwrap();
+    let variables: Vec<&str> = rule.bound_nodes().map(|node| &*node.variable).collect();
+    let [robot, from, to] = variables[..] else {
+        panic!("{variables:?}");
+    };
+    let tell = |pairs: &[(&str, &str)]| {
+        let pairs = pairs.iter().map(|&(v, n)| (v.to_owned(), n.to_owned()));
+        let partial = bound(&snapshot, &pairs.collect());
+        let obstacle = grammar.partial_obstacle(&snapshot, rule, &partial);
+        let told = obstacle.unwrap().map(|obstacle| obstacle.to_string());
+        told.map(|told| {
+            told.replace(&format!("{robot} ("), "robot (")
+                .replace(&format!("{to} ("), "to (")
+        })
+    };
+    assert_eq!(
+        tell(&[(robot, "ana")]).unwrap(),
+        "robot (ana) is a person, not a robot"
+    );
+    assert_eq!(tell(&[(robot, "shelly"), (to, "kitchen")]), None);
+    assert!(
+        tell(&[(robot, "shelly"), (from, "ward")])
+            .unwrap()
+            .contains("has no link `in` to")
+    );
+    assert!(
+        tell(&[(from, "hall"), (to, "ward")])
+            .unwrap()
+            .contains("has no link `connected` to")
+    );
+    assert!(
+        tell(&[(from, "ward"), (to, "ward")])
+            .unwrap()
+            .contains("are the same node")
+    );
+    let ward = tell(&[(from, "ward")]).unwrap();
+    assert!(ward.contains("has no link `in` from a robot"), "{ward}");
+}
+
+#[test]
 fn bindings_are_checked_against_the_rule() {
     let grammar = read(CARE);
     let centre = care_centre();

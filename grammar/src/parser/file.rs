@@ -118,7 +118,7 @@ impl Parser<'_> {
             if self.is_word("include") && self.is_symbol_at(self.at + 1, "(") {
                 parsed
                     .regions
-                    .push(self.region(token.range.start, Part::Other));
+                    .push(self.region(token.range.start, Part::Include));
                 let comments = self.comments_before(token.range.start);
                 if let Some(path) = self.include() {
                     parsed.items.push(Item::Include(Include { path, comments }));
@@ -128,7 +128,7 @@ impl Parser<'_> {
             } else if self.is_word("types") && self.is_symbol_at(self.at + 1, "{") {
                 parsed
                     .regions
-                    .push(self.region(token.range.start, Part::Other));
+                    .push(self.region(token.range.start, Part::Types));
                 if !parsed.types.is_empty() {
                     let what = "`types`".to_owned();
                     self.report(token.range, Problem::Repeated { what });

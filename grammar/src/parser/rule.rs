@@ -130,6 +130,12 @@ impl Parser<'_> {
         }
         header.name = self.name("a rule's name")?;
         self.expect(":", "`:` after the rule's name")?;
+        while MODIFIERS.contains(&self.token_text(self.at)) {
+            let word = self.token_text(self.at).to_owned();
+            let range = self.bump();
+            let rule = header.name.to_string();
+            self.report(range, Problem::Misplaced { word, rule });
+        }
         match self.token_text(self.at) {
             "active" => header.kind = Kind::Active,
             "passive" => header.kind = Kind::Passive,

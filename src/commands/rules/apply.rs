@@ -55,9 +55,14 @@ fn the_match(
             Ok(Err(why.map_or_else(String::new, |why| why.to_string())))
         }
         [] if given.is_empty() => Ok(Err("its left-hand side holds nowhere".to_owned())),
-        [] => Ok(Err(
-            "its left-hand side holds nowhere with this binding".to_owned()
-        )),
+        [] => {
+            let why = grammar.partial_obstacle(snapshot, rule, given);
+            let nowhere = "its left-hand side holds nowhere with this binding".to_owned();
+            Ok(Err(match why.map_err(unmatched)? {
+                Some(why) => format!("{nowhere}: {why}"),
+                None => nowhere,
+            }))
+        }
         [first, second, ..] => {
             let mut names = Names::new(snapshot);
             let pair = [names.of_all(first)?, names.of_all(second)?].map(|m| words(rule, &m));

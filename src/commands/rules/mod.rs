@@ -12,8 +12,8 @@ use crate::cli::{Rules as Arguments, RulesAction, WorldArgs};
 use crate::{Answer, Failure};
 use dsr::{Graph, NodeId, Session, Snapshot};
 use grammar::{
-    Binding, Combo, ComboStep, Defects, Diagnostic, Grammar, MatchError, Problem, Rule, Severity,
-    Sound, Unfolded,
+    Binding, Combo, ComboStep, Defects, Diagnostic, Grammar, MatchError, Name, Problem, Rule,
+    Severity, Sound, Unfolded,
 };
 use serde_json::{Map, Value as Json, json};
 use std::collections::{BTreeMap, BTreeSet};
@@ -65,30 +65,63 @@ fn read(file: &Path) -> Result<(Grammar, Vec<Diagnostic>), Failure> {
     Ok(super::read_grammar(&super::read_text(file)?, file))
 }
 
-/// The grammar, without the rules in which errors lie: those are told, and do not keep others from
-/// being used. If that one rule is asked for, or nothing is left, they are the failure.
+/// The grammar, without the rules that cannot be used because of an error: those are told, and do not keep
+/// others from being used. If that one rule is asked for, or nothing is left, they are the failure.
 fn load(file: &Path, rule: Option<&str>) -> Result<Grammar, Failure> {
     let (grammar, mut diagnostics) = read(file)?;
     if !grammar::has_errors(&diagnostics) {
         return Ok(grammar);
     }
-    let sound = grammar
-        .sound(&diagnostics)
-        .filter(|Sound { grammar, left_out }| {
-            let asked = rule.is_some_and(|rule| left_out.iter().any(|name| *name == *rule));
-            let there = rule.is_some_and(|rule| grammar.rule(rule).is_some());
-            grammar.all_rules().next().is_some() && (there || !asked)
-        });
-    let Some(Sound { grammar, left_out }) = sound else {
-        return Err(Failure::Input(Defects { diagnostics }.into()));
+    let failure = |diagnostics| Err(Failure::Input(Defects { diagnostics }.into()));
+    let sound = match grammar.sound(&diagnostics) {
+        Ok(sound) => sound,
+        Err(why) => {
+            tell(&format!("{why}\n"));
+            return failure(diagnostics);
+        }
     };
+    let listed = |names: &[Name]| {
+        let names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+        names.join(", ")
+    };
+    let Sound {
+        grammar,
+        left_out,
+        missing,
+        dependent,
+    } = sound;
+    let mut told = Vec::new();
+    if !missing.is_empty() {
+        let files = listed(&missing);
+        told.push(format!(
+            "{files} and types there that inherit from those here"
+        ));
+    }
+    if !dependent.is_empty() {
+        let rules = listed(&dependent);
+        told.push(format!("{rules}, whose types may be declared there"));
+    }
+    if !left_out.is_empty() {
+        told.push(format!("the broken rules {}", listed(&left_out)));
+    }
+    let tell_of = |all: &[String]| {
+        for what in all {
+            tell(&format!("warning: without {what}\n"));
+        }
+    };
+    let asked = rule.is_some_and(|rule| {
+        let mut unusable = left_out.iter().chain(&dependent);
+        unusable.any(|name| *name == *rule) && grammar.rule(rule).is_none()
+    });
+    if asked || grammar.all_rules().next().is_none() {
+        if !dependent.is_empty() {
+            tell_of(&told);
+        }
+        return failure(diagnostics);
+    }
     diagnostics.retain(|diagnostic| diagnostic.severity() == Severity::Error);
     warn(diagnostics);
-    let names: Vec<String> = left_out.iter().map(|name| format!("`{name}`")).collect();
-    tell(&format!(
-        "warning: without the broken rules {}\n",
-        names.join(", ")
-    ));
+    tell_of(&told);
     Ok(grammar)
 }
 
