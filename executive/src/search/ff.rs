@@ -36,6 +36,9 @@ pub(super) struct Ff<'a> {
     reached: Vec<Reached>,
     open: Queue,
     marked: Vec<bool>,
+    /// What is to be reached, and by proposition whether it is one of that.
+    goals: Vec<Proposition>,
+    is_goal: Vec<bool>,
     /// Applicable actions of the last relaxed plan, ascending.
     pub(super) preferred: Vec<u32>,
 }
@@ -79,7 +82,21 @@ impl<'a> Ff<'a> {
             reached: Vec::new(),
             open: Queue::default(),
             marked: vec![false; relaxed.propositions],
+            goals: vec![relaxed.goal],
+            is_goal: (0..relaxed.propositions as u32)
+                .map(|p| p == relaxed.goal)
+                .collect(),
             preferred: Vec::new(),
+        }
+    }
+
+    /// Estimates the way to where all of `goals` hold from now on.
+    pub(super) fn aim_at(&mut self, goals: Vec<Proposition>) {
+        for goal in std::mem::replace(&mut self.goals, goals) {
+            self.is_goal[goal as usize] = false;
+        }
+        for &goal in &self.goals {
+            self.is_goal[goal as usize] = true;
         }
     }
 
@@ -87,7 +104,8 @@ impl<'a> Ff<'a> {
     pub(super) fn estimate(&mut self, state: &[u64]) -> Option<Micro> {
         self.explore(state);
         self.preferred.clear();
-        if self.reached[self.relaxed.goal as usize].distance == UNREACHED {
+        let mut goals = self.goals.iter();
+        if goals.any(|&goal| self.reached[goal as usize].distance == UNREACHED) {
             return None;
         }
         Some(self.extract(state))
@@ -107,12 +125,16 @@ impl<'a> Ff<'a> {
             self.reached[proposition as usize].distance = 0;
             self.open.push(0, proposition);
         });
+        let mut missing = self.goals.len();
         while let Some((cost, proposition)) = self.open.pop() {
             if cost > self.reached[proposition as usize].distance {
                 continue;
             }
-            if proposition == relaxed.goal {
-                break;
+            if self.is_goal[proposition as usize] {
+                missing -= 1;
+                if missing == 0 {
+                    break;
+                }
             }
             for &operator in relaxed.needed_by.of(proposition) {
                 let progress = &mut self.progress[operator as usize];
@@ -140,7 +162,7 @@ impl<'a> Ff<'a> {
         let relaxed = self.relaxed;
         self.marked.fill(false);
         let mut chosen = Vec::new();
-        let mut stack: Vec<Proposition> = vec![relaxed.goal];
+        let mut stack: Vec<Proposition> = self.goals.clone();
         while let Some(proposition) = stack.pop() {
             let index = proposition as usize;
             if std::mem::replace(&mut self.marked[index], true) || self.reached[index].distance == 0

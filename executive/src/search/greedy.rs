@@ -7,7 +7,7 @@ use super::ff::Ff;
 use super::landmarks::Landmarks;
 use super::limits::Limits;
 use super::states::{Known, NONE, Node, States};
-use crate::task::{Micro, State, Task};
+use crate::task::{Literal, Micro, State, Task};
 use std::collections::{BTreeMap, VecDeque};
 
 /// What a search came to.
@@ -92,21 +92,45 @@ pub(super) struct Ranking {
     pub(super) unit: Micro,
     /// A plan must cost less.
     pub(super) bound: Micro,
+    /// Whether only preferred actions are looked at: then nothing found says nothing.
+    pub(super) narrow: bool,
 }
 
-/// Searches a plan that costs less than the ranking's bound.
+/// From where to where a search goes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Way<'a> {
+    pub(super) from: &'a [u64],
+    /// What holds at its end; without, the task's goal.
+    pub(super) to: Option<&'a [Literal]>,
+}
+
+impl<'a> Way<'a> {
+    /// The task's own.
+    pub(super) fn of(task: &'a Task) -> Self {
+        Self {
+            from: task.initial(),
+            to: None,
+        }
+    }
+
+    fn ends_at(&self, task: &Task, state: &[u64]) -> bool {
+        match self.to {
+            Some(literals) => literals.iter().all(|literal| literal.holds(state)),
+            None => task.is_goal(state),
+        }
+    }
+}
+
+/// Searches a plan that costs less than the ranking's bound. The heuristic looks at where the way ends.
 pub(super) fn search(
     task: &Task,
+    way: Way<'_>,
     heuristic: &mut Ff<'_>,
     landmarks: &Landmarks,
     ranking: Ranking,
     limits: &mut Limits<'_>,
 ) -> Found {
-    let Ranking {
-        weight,
-        unit,
-        bound,
-    } = ranking;
+    let Ranking { weight, bound, .. } = ranking;
     // Without a bound, any way to a state is as good as another.
     let reopens = weight.is_some() || bound != Micro::MAX;
     let mut states = States::new(task.words());
@@ -118,7 +142,7 @@ pub(super) fn search(
     // The landmarks accepted on the way to each node.
     let words = landmarks.words();
     let mut accepted: Vec<u64> = Vec::new();
-    next.extend_from_slice(task.initial());
+    next.extend_from_slice(way.from);
     loop {
         // Enter the state in `next`, reached by `from`.
         let (parent, action) = from;
@@ -127,7 +151,7 @@ pub(super) fn search(
         } else {
             task.cost_after(states.known(parent).cost, action as usize)
         };
-        let way = Known {
+        let reached = Known {
             parent,
             action,
             cost,
@@ -144,13 +168,16 @@ pub(super) fn search(
                         let before = parent as usize * words;
                         accepted.extend_from_within(before..before + words);
                     }
-                    let node = states.insert(&next, way);
+                    let node = states.insert(&next, reached);
                     landmarks.accept(&next, &mut accepted[node as usize * words..]);
                     Some((node, true))
                 }
                 Some(node) if reopens && cost < states.known(node).cost => {
                     let estimate = states.known(node).estimate;
-                    *states.known_mut(node) = Known { estimate, ..way };
+                    *states.known_mut(node) = Known {
+                        estimate,
+                        ..reached
+                    };
                     // Nothing leads on from a dead end, whatever the way to it costs.
                     (estimate != Micro::MAX).then_some((node, false))
                 }
@@ -158,7 +185,7 @@ pub(super) fn search(
             }
         };
         if let Some((node, new)) = entered {
-            if task.is_goal(&next) {
+            if way.ends_at(task, &next) {
                 return Found::Plan(states.way_to(node));
             }
             let bytes = states.bytes() + queues.bytes() + accepted.capacity() * 8;
@@ -172,7 +199,7 @@ pub(super) fn search(
                 let mut estimates = [Some(estimate), None];
                 if words > 0 {
                     let own = &accepted[node as usize * words..][..words];
-                    estimates[1] = Some(landmarks.count(&next, own).saturating_mul(unit));
+                    estimates[1] = Some(landmarks.count(&next, own).saturating_mul(ranking.unit));
                 }
                 for (estimate, best) in estimates.iter().zip(&mut best) {
                     if let Some(estimate) = estimate
@@ -189,12 +216,13 @@ pub(super) fn search(
                         Some(weight) => cost.saturating_add(weight.saturating_mul(estimate?)),
                     })
                 });
-                task.applicable(&next, &mut applicable);
-                if bound != Micro::MAX {
-                    let below = |&action: &u32| task.cost_after(cost, action as usize) < bound;
-                    applicable.retain(below);
-                    heuristic.preferred.retain(below);
-                }
+                choose(
+                    task,
+                    (&next, cost),
+                    ranking,
+                    &mut applicable,
+                    &mut heuristic.preferred,
+                );
                 queues.push(ranks, node, &applicable, &heuristic.preferred);
             }
         }
@@ -204,5 +232,26 @@ pub(super) fn search(
         };
         task.successor(states.state(parent), action as usize, &mut next);
         from = (parent, action);
+    }
+}
+
+/// The actions to go on with from a state that is reached at a cost, among them the preferred ones.
+fn choose(
+    task: &Task,
+    (state, cost): (&[u64], Micro),
+    ranking: Ranking,
+    applicable: &mut Vec<u32>,
+    preferred: &mut Vec<u32>,
+) {
+    if ranking.narrow {
+        applicable.clear();
+        applicable.append(preferred);
+    } else {
+        task.applicable(state, applicable);
+    }
+    if ranking.bound != Micro::MAX {
+        let below = |&action: &u32| task.cost_after(cost, action as usize) < ranking.bound;
+        applicable.retain(below);
+        preferred.retain(below);
     }
 }

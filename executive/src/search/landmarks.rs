@@ -25,13 +25,18 @@ pub(super) struct Landmarks {
 }
 
 impl Landmarks {
-    /// Finds them.
-    pub(super) fn new(task: &Task, relaxed: &Relaxed) -> Self {
-        let none = Self {
+    /// None at all: a search that has them goes by its other estimate alone.
+    pub(super) fn none() -> Self {
+        Self {
             literals: Vec::new(),
             is_goal: Vec::new(),
             enables: Vec::new(),
-        };
+        }
+    }
+
+    /// Finds them.
+    pub(super) fn new(task: &Task, relaxed: &Relaxed) -> Self {
+        let none = Self::none();
         let Some(before) = sets(task, relaxed) else {
             return none;
         };

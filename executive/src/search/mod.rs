@@ -11,12 +11,13 @@ mod limits;
 mod queue;
 mod relaxed;
 mod states;
+mod windows;
 
 pub use limits::{Limits, StopReason};
 
 use crate::task::{Literal, Micro, Task};
 use ff::Ff;
-use greedy::{Found, Ranking};
+use greedy::{Found, Ranking, Way};
 use landmark_cut::LandmarkCut;
 use landmarks::Landmarks;
 use relaxed::Relaxed;
@@ -110,9 +111,10 @@ pub fn search(task: &Task, effort: Effort, limits: &mut Limits<'_>) -> Answer {
         weight: None,
         unit: 1,
         bound: Micro::MAX,
+        narrow: false,
     };
     let before = limits.expanded();
-    let mut best = match greedy::search(task, &mut unit, &landmarks, first, limits) {
+    let mut best = match greedy::search(task, Way::of(task), &mut unit, &landmarks, first, limits) {
         Found::Plan(actions) => actions,
         Found::Nothing => return Answer::Unsolvable,
         Found::Stopped(reason) => return Answer::Stopped(reason),
@@ -121,20 +123,32 @@ pub fn search(task: &Task, effort: Effort, limits: &mut Limits<'_>) -> Answer {
     // One unit is added to each cost, so that free actions do not make a way look short.
     let by_cost: Vec<Micro> = costs().map(|c| c.saturating_add(1_000_000)).collect();
     let mut by_cost = Ff::new(task, &relaxed, &by_cost);
-    let mut schedule = [None, Some(5), Some(3), Some(2), Some(1)].into_iter();
+    let polish = ((limits.expanded() - before) / 4).clamp(LEAST_POLISH, MOST_POLISH);
     if effort == Effort::First {
         // A little work more makes the plan better by far: it came without a look at costs.
-        limits.cap(((limits.expanded() - before) / 2).clamp(LEAST_POLISH, MOST_POLISH));
+        limits.cap(polish);
+    } else {
+        best = windows::improve(task, &relaxed, &mut by_cost, best, LONG_POLISH, limits);
+        limits.uncap();
     }
     let mut optimal = false;
-    let mut weight = schedule.next().flatten();
+    let mut schedule = [5, 3, 2, 1].into_iter();
+    let mut weight = schedule.next();
     loop {
         let ranking = Ranking {
             weight,
             unit: 1_000_000,
             bound: task.plan_cost(&best).unwrap_or(Micro::MAX),
+            narrow: false,
         };
-        match greedy::search(task, &mut by_cost, &landmarks, ranking, limits) {
+        match greedy::search(
+            task,
+            Way::of(task),
+            &mut by_cost,
+            &landmarks,
+            ranking,
+            limits,
+        ) {
             Found::Plan(better) => best = without_needless(task, better),
             // The search saw every state that a cheaper plan could pass through.
             Found::Nothing => {
@@ -143,17 +157,27 @@ pub fn search(task: &Task, effort: Effort, limits: &mut Limits<'_>) -> Answer {
             }
             Found::Stopped(_) => break,
         }
-        weight = schedule.next().map_or(weight, |step| step);
+        if effort != Effort::First {
+            best = windows::improve(task, &relaxed, &mut by_cost, best, LONG_POLISH, limits);
+            limits.uncap();
+        }
+        weight = schedule.next().or(weight);
+    }
+    if effort == Effort::First && !optimal {
+        best = windows::improve(task, &relaxed, &mut by_cost, best, polish, limits);
     }
     limits.uncap();
     solved(task, best, optimal)
 }
 
-/// So many states are expanded at least to make a first plan better.
-const LEAST_POLISH: u64 = 700;
+/// So many states are expanded at least to make a first plan better as a whole, and again piece by piece.
+const LEAST_POLISH: u64 = 350;
 
 /// ... and so many at the most.
-const MOST_POLISH: u64 = 2000;
+const MOST_POLISH: u64 = 1000;
+
+/// So many where there is time.
+const LONG_POLISH: u64 = 20_000;
 
 /// Plans longer than this are not looked through: it takes the square of their length.
 const LONG_PLAN: usize = 1000;

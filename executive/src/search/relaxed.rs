@@ -232,6 +232,11 @@ impl Relaxed {
         }
     }
 
+    /// The propositions of those literals that conditions name.
+    pub(super) fn of_literals(&self) -> FxHashMap<Literal, Proposition> {
+        self.literals.iter().copied().collect()
+    }
+
     /// Which actions can ever be applied, and which literals (by [`Literal::index`]) can ever
     /// hold, by the relaxed task; and whether the goal can.
     pub(super) fn reachable(&self, task: &Task) -> Reachable {

@@ -134,6 +134,26 @@ proptest! {
     }
 
     #[test]
+    fn a_plan_that_is_made_better_piece_by_piece_is_one_and_costs_no_more(task in task()) {
+        let relaxed = Relaxed::new(&task);
+        let units = vec![1; task.actions().len()];
+        let mut heuristic = Ff::new(&task, &relaxed, &units);
+        let ranking = Ranking { weight: None, unit: 1, bound: Micro::MAX, narrow: false };
+        let way = Way::of(&task);
+        let none = Landmarks::none();
+        let found = greedy::search(&task, way, &mut heuristic, &none, ranking, &mut Limits::new());
+        if let Found::Plan(plan) = found {
+            let mut limits = Limits::new();
+            let before = plan.clone();
+            let better =
+                windows::improve(&task, &relaxed, &mut heuristic, before, 500, &mut limits);
+            let cost = task.plan_cost(&better);
+            prop_assert!(cost.is_some() && cost <= task.plan_cost(&plan), "{better:?} for {plan:?}");
+            prop_assert_eq!(windows::is_plan(&task, &better), true);
+        }
+    }
+
+    #[test]
     fn the_estimates_of_landmark_cut_never_exceed_the_true_cost(task in task()) {
         let relaxed = Relaxed::new(&task);
         let costs: Vec<Micro> = task.actions().iter().map(|a| a.cost).collect();
