@@ -310,6 +310,14 @@ pub struct Mission {
     pub deadline: Option<f64>,
     /// When it gives way to one of higher priority: `at_once`, `between_steps` or `never`.
     pub preemption: String,
+    /// It does not begin before this.
+    pub begins: Option<Time>,
+    /// It begins again so many seconds after it began, again and again.
+    pub period: Option<f64>,
+    /// It fails where its goal does not hold so many seconds after it began.
+    pub within: Option<f64>,
+    /// It does not begin before this mission has succeeded.
+    pub after: Option<String>,
 }
 
 /// How recorded pedestrians map into the world, and where to begin.

@@ -129,12 +129,21 @@ fn mission(scenario: &Scenario, mission: &scenarios::scenario::Mission) -> Missi
     let preemption = Preemption::ALL
         .into_iter()
         .find(|policy| policy.name() == mission.preemption);
+    let begins = mission.begins.unwrap_or(scenario.start);
+    let deadlines = [
+        mission.deadline.map(|deadline| scenario.start + deadline),
+        mission.within.map(|within| begins + within),
+    ];
     MissionSpec {
         name: mission.name.clone(),
         goal: mission.goal.clone(),
         priority: mission.priority,
-        deadline: mission.deadline.map(|deadline| scenario.start + deadline),
+        deadline: deadlines.into_iter().flatten().min(),
         preemption: preemption.unwrap_or_default(),
-        schedule: Schedule::default(),
+        schedule: Schedule {
+            begins: mission.begins,
+            period: mission.period,
+            after: mission.after.clone(),
+        },
     }
 }

@@ -3,7 +3,7 @@
 
 use super::diagnostic::{Invalid, Problem, ProblemKind, suggest};
 use super::reader::{Bound, Located, Problems, Table};
-use super::value::Preemption;
+use super::value::{DAY, Period, Preemption};
 use super::{Mission, Scenario, TracksFrame};
 use super::{devices, people, schedule, space};
 use agents::human_observer;
@@ -260,7 +260,7 @@ fn whole(table: &Table<'_>, text: &str, read: Read<'_>) -> Scenario {
     let people = people::people(table, &mut names, &scene);
     let streams = people::streams(table, &mut names, &rooms);
     let activities = schedule::activities(table, &mut names, begin.date());
-    let missions = missions(table, &mut names, read);
+    let missions = missions(table, &mut names, begin, read);
     let rules = file(table, "rules", "rules.aggl", read);
     let tracks = tracks(table);
     let social = social(table);
@@ -304,8 +304,14 @@ fn file(table: &Table<'_>, key: &'static str, default: &str, read: Read<'_>) -> 
     })
 }
 
-fn missions(scenario: &Table<'_>, names: &mut Names<'_>, read: Read<'_>) -> Vec<Mission> {
+fn missions(
+    scenario: &Table<'_>,
+    names: &mut Names<'_>,
+    begin: DateTime,
+    read: Read<'_>,
+) -> Vec<Mission> {
     let mut missions = Vec::new();
+    let mut waits = Vec::new();
     for table in scenario.tables("mission") {
         let name = names.take(&table, Kind::Other);
         let path = table.require::<String>("goal");
@@ -316,6 +322,18 @@ fn missions(scenario: &Table<'_>, names: &mut Names<'_>, read: Read<'_>) -> Vec<
         let deadline = table.get::<f64>("deadline").map(|deadline| deadline.value);
         let preemption = table.get::<Preemption>("preemption");
         let preemption = preemption.map_or(Preemption::default(), |policy| policy.value);
+        let period = table.get::<Period>("every").map(|period| period.value.0);
+        let within = table
+            .has("within")
+            .then(|| table.number("within", Bound::Positive, 1.0));
+        let at = table.moment::<ClockTime>("at");
+        let begins = match at {
+            Some(at) => next(begin, at),
+            // Periods are counted from its first beginning.
+            None => period.and_then(|_| time(begin)),
+        };
+        let after = table.get::<String>("after");
+        waits.extend(after.clone());
         if let (Some(name), Some(path), Some(goal)) = (name, path, goal) {
             missions.push(Mission {
                 name,
@@ -324,11 +342,30 @@ fn missions(scenario: &Table<'_>, names: &mut Names<'_>, read: Read<'_>) -> Vec<
                 priority,
                 deadline,
                 preemption: preemption.0,
+                begins,
+                period,
+                within,
+                after: after.map(|after| after.value),
             });
         }
         table.close();
     }
+    for after in waits {
+        if !missions.iter().any(|mission| mission.name == after.value) {
+            names.unknown(scenario.problems, "mission", &[Kind::Other], &after);
+        }
+    }
     missions
+}
+
+/// The first time after `begin`, or at it, that a clock shows `at`.
+fn next(begin: DateTime, at: ClockTime) -> Option<Time> {
+    let today = time_of_day(begin.date(), at)?;
+    Some(if today < time(begin)? {
+        today + DAY
+    } else {
+        today
+    })
 }
 
 fn tracks(scenario: &Table<'_>) -> TracksFrame {

@@ -3,7 +3,7 @@
 #![allow(clippy::float_cmp, reason = "what a file says is read to the bit")]
 #![allow(clippy::too_many_lines, reason = "a report is read in one piece")]
 
-use super::{Face, Invalid, ProblemKind, Scenario};
+use super::{Face, Invalid, Mission, ProblemKind, Scenario};
 use expect_test::{Expect, expect};
 use miette::{GraphicalReportHandler, GraphicalTheme};
 use nalgebra::Point2;
@@ -129,6 +129,41 @@ fn a_good_file_is_read_whole() {
         "a place says where to look"
     );
     assert_eq!(schedule[1].face, Some(Face::Person(1)));
+}
+
+#[test]
+fn missions_have_times_of_the_day_periods_and_an_order() {
+    let more = "at = \"10:30\"\nevery = \"day\"\nwithin = 60\n\n[[mission]]\nname = \"look\"\n\
+                goal = \"missions/visit.aggt\"\nat = \"09:00\"\nafter = \"visit\"\n\n[[mission]]\nname = \"turn\"\n\
+                goal = \"missions/visit.aggt\"\nevery = 90\n";
+    let scenario = parse(&format!("{TWO_ROOMS}{more}")).unwrap();
+    let times = |mission: &Mission| {
+        let begins = mission.begins.map(|begins| begins.since(scenario.start));
+        (
+            begins,
+            mission.period,
+            mission.within,
+            mission.after.clone(),
+        )
+    };
+    let times: Vec<_> = scenario.missions.iter().map(times).collect();
+    let next_day = 23.0 * 3600.0;
+    assert_eq!(
+        times,
+        [
+            (Some(1800.0), Some(86_400.0), Some(60.0), None),
+            (Some(next_day), None, None, Some("visit".to_owned())),
+            (Some(0.0), Some(90.0), None, None),
+        ]
+    );
+    let wrong = "at = \"25:00\"\nevery = \"moon\"\nwithin = 0\nafter = \"vist\"\n";
+    let told = parse(&format!("{TWO_ROOMS}{wrong}")).unwrap_err();
+    let told: Vec<String> = told.problems.iter().map(ToString::to_string).collect();
+    assert_eq!(told.len(), 4, "{told:?}");
+    assert!(
+        told[1].contains("\"week\"") && told[3].contains("vist"),
+        "{told:?}"
+    );
 }
 
 #[test]

@@ -12,6 +12,9 @@ pub(super) trait Value: Sized {
     fn read(value: &DeValue<'_>) -> Option<Self>;
 }
 
+/// Seconds of a day.
+pub(super) const DAY: f64 = 86_400.0;
+
 impl Value for f64 {
     const EXPECTED: &'static str = "a number";
     fn read(value: &DeValue<'_>) -> Option<Self> {
@@ -52,6 +55,23 @@ impl Value for String {
         } else {
             None
         }
+    }
+}
+
+/// How long it takes until a mission begins again, seconds.
+pub(super) struct Period(pub(super) f64);
+
+impl Value for Period {
+    const EXPECTED: &'static str = "\"hour\", \"day\", \"week\" or a number of seconds above 0";
+    fn read(value: &DeValue<'_>) -> Option<Self> {
+        let seconds = match String::read(value).as_deref() {
+            Some("hour") => Some(3600.0),
+            Some("day") => Some(DAY),
+            Some("week") => Some(7.0 * DAY),
+            Some(_) => None,
+            None => f64::read(value),
+        };
+        seconds.filter(|seconds| *seconds > 0.0).map(Self)
     }
 }
 
