@@ -100,10 +100,12 @@ async function showNode(id) {
       const age = one.age < 120 ? `${one.age.toFixed(1)} s` : `${(one.age / 60).toFixed(0)} min`;
       const buttons = element('span');
       buttons.append(past, ' ', whyButton(path));
-      return [one.name, one.text, one.writer, age, buttons];
+      const value = element('span', one.text.length > 160 ? `${one.text.slice(0, 160)} \u2026` : one.text, { title: one.text });
+      value.append(element('br'), element('small', `${one.writer}, ${age} ago`, { class: 'soft' }));
+      return [one.name, value, buttons];
     });
     const edges = node.edges.map((edge) => [other(edge.from, edge.from_id), edge.label, other(edge.to, edge.to_id)]);
-    place.replaceChildren(title, table(['attribute', 'value', 'by', 'age', ''], rows), element('h2', 'Edges'), table(['from', 'label', 'to'], edges));
+    place.replaceChildren(title, table(['attribute', 'value, by whom, how old', ''], rows), element('h2', 'Edges'), table(['from', 'label', 'to'], edges));
     if (mayEdit()) place.append(setForm(node));
   } catch (error) { say(error.message, true); }
 }
