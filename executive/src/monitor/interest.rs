@@ -1,5 +1,8 @@
 //! What a judgement of a plan hangs on. This file guarantees that a commit which touches none of it
 //! leaves the judgement as it is.
+//!
+//! A [`grammar::Watch`] keeps every match of its rules up to date. A plan's conditions speak of certain nodes:
+//! to know whether a commit matters, it is enough to look whether it touches them, without a match.
 
 use super::ground;
 use crate::mission::record::Step;
