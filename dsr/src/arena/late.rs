@@ -7,8 +7,12 @@
 
 use super::{Address, Arena, Root, Word, trie};
 
-/// The node's id and its record's words, where a root has a late node.
-fn node<'a>(arena: &'a Arena, root: &Root) -> Result<Option<(u64, &'a [Word])>, Address> {
+/// The node's id and its record's words, where a root has a late node; `Err` where it leads to an
+/// impossible place.
+pub(crate) fn node<'a>(
+    arena: &'a Arena,
+    root: &Root,
+) -> Result<Option<(u64, &'a [Word])>, Address> {
     if root.late_node == 0 {
         return Ok(None);
     }

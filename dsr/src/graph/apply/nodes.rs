@@ -4,7 +4,7 @@
 use super::{Work, damaged, read};
 use crate::arena::record::{self, NodeInPlace, NodeRecord};
 use crate::arena::table::Table;
-use crate::arena::{Address, Word, cells, late, tree, trie};
+use crate::arena::{Address, cells, late, tree, trie};
 use crate::graph::Writer;
 use crate::rights::Carrier;
 use crate::value::hash;
@@ -75,23 +75,22 @@ impl Work<'_> {
     /// and the trie in the next commit. Of several such nodes all but the last are entered now.
     pub(super) fn lead_late(&mut self, id: u64, new: Address) -> Result<(), Refusal> {
         self.graph.writer.moved.push((id, new));
-        if self.late_id() != Some(id) {
+        if self.late_id()? != Some(id) {
             self.enter_late_node()?;
         }
         self.root.late_node = new;
         Ok(())
     }
 
-    fn late_id(&self) -> Option<u64> {
-        let late = (self.root.late_node != 0).then_some(self.root.late_node)?;
-        let record = self.graph.writer.arena.from(late)?;
-        record.first().map(Word::load)
+    fn late_id(&self) -> Result<Option<u64>, Refusal> {
+        let late = read(late::node(&self.graph.writer.arena, &self.root))?;
+        Ok(late.map(|(id, _)| id))
     }
 
     /// Enters into the trie the node that only the root leads to, and retires the record that the trie
     /// led to.
     pub(super) fn enter_late_node(&mut self) -> Result<(), Refusal> {
-        let (Some(id), late) = (self.late_id(), self.root.late_node) else {
+        let (Some(id), late) = (self.late_id()?, self.root.late_node) else {
             return Ok(());
         };
         self.root.late_node = 0;
