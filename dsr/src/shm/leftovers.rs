@@ -7,6 +7,7 @@
 //! - Shared memory that has no size yet: whoever opens it waits for ever, the cleaning itself too.
 //! - A tag in its node's folder that is not whole: the folder is never empty, and cleaned in vain.
 //! - A node without its lock, or a connection that nobody has entered yet: it is never looked at.
+//! - A node without its details, which say where its files are: it is looked for elsewhere.
 
 use super::gate::Gate;
 use super::{InstanceError, Ipc, IpcNode, ROOM, ipc, memory_of, room_for};
@@ -58,7 +59,7 @@ fn name_of(path: &Path) -> &str {
 pub(super) struct Members {
     /// The processes that have joined and live.
     pub(super) alive: BTreeSet<u32>,
-    /// What has not been cleaned up after.
+    /// What has not been cleaned up after, and iceoryx2 can.
     dead: Vec<DeadNodeView<Ipc>>,
     /// What is in a state that iceoryx2 cannot tell.
     unclear: BTreeSet<u32>,
@@ -72,7 +73,9 @@ impl Members {
             let process = process.map_or(0, |process| process.value().cast_unsigned());
             match state {
                 NodeState::Alive(_) => drop(members.alive.insert(process)),
-                NodeState::Dead(node) => members.dead.push(node),
+                NodeState::Dead(node) if node.details().is_some() => members.dead.push(node),
+                // It has made nothing but its lock, or all else has been removed.
+                NodeState::Dead(_) => {}
                 _ => drop(members.unclear.insert(process)),
             }
             CallbackProgression::Continue
