@@ -225,14 +225,14 @@ impl ArenaSubscriber {
 
     /// The newest arena that has shown itself, of those that had begun to arrive at the last
     /// [`Self::poll`].
-    pub(super) fn newest(&mut self) -> Option<(Epoch, Arc<Arena>)> {
+    pub(super) fn newest(&mut self) -> Option<&(Epoch, Arc<Arena>)> {
         if let Some((epoch, arena)) = &self.coming
             && arena.epoch() == Some(*epoch)
         {
             self.current.set(Arc::clone(arena));
             self.arena = self.coming.take();
         }
-        self.arena.clone()
+        self.arena.as_ref()
     }
 
     /// Takes what has arrived.

@@ -220,17 +220,23 @@ impl Session {
     }
 
     fn arena(&mut self) -> Result<Option<(Epoch, Arc<Arena>)>, InstanceError> {
+        self.look()?;
+        Ok(self.arena.newest().cloned())
+    }
+
+    /// Looks for memory that has come, unless it just did.
+    fn look(&mut self) -> Result<(), InstanceError> {
         // Before the look: what comes during it may go unseen.
         let time = now();
         let looked = self.looked.filter(|_| self.arena.newest().is_some());
         if looked.is_none_or(|looked| time.saturating_duration_since(looked) >= NEWS) {
             self.arena.poll()?;
             if let Some(hot) = &mut self.hot {
-                hot.poll(self.arena.newest().map(|(_, arena)| arena).as_deref())?;
+                hot.poll(self.arena.newest().map(|(_, arena)| arena.as_ref()))?;
             }
             self.looked = Some(time);
         }
-        Ok(self.arena.newest())
+        Ok(())
     }
 
     /// The life of the store whose graph this process sees.
@@ -238,8 +244,9 @@ impl Session {
     /// # Errors
     /// [`AttachError::NoStore`].
     pub fn epoch(&mut self) -> Result<Epoch, AttachError> {
-        let found = self.arena()?;
-        found.map(|(epoch, _)| epoch).ok_or_else(|| self.no_store())
+        self.look()?;
+        let found = self.arena.newest().map(|(epoch, _)| *epoch);
+        found.ok_or_else(|| self.no_store())
     }
 
     fn no_store(&self) -> AttachError {

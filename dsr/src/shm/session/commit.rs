@@ -164,7 +164,7 @@ impl Session {
 
     /// The store that was there at the last look; who asks it looks whether it still is.
     fn known_aim(&mut self) -> Result<Aim, CommitError> {
-        match self.arena.newest() {
+        match self.arena.newest().cloned() {
             Some(found) => self.aim_at(found),
             None => self.aim(),
         }

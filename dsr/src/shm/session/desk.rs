@@ -155,7 +155,8 @@ impl Session {
             ring(&self.wake_store);
         }
         // Now that the store has something to do. One that was restarted takes nothing that is for the one before.
-        let newest = self.arena()?.map(|(epoch, _)| epoch);
+        self.look()?;
+        let newest = self.arena.newest().map(|(epoch, _)| *epoch);
         let Some(desk) = self.desk.as_mut().filter(|_| newest == Some(aim.epoch)) else {
             return Ok(None);
         };

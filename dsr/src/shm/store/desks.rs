@@ -98,6 +98,11 @@ impl Desks {
         });
     }
 
+    /// How many there are.
+    pub(super) fn count(&self) -> usize {
+        self.adopted.len()
+    }
+
     /// Whether a request lies on a desk that the store has not seen.
     pub(super) fn has_requests(&self) -> bool {
         self.adopted.iter().any(Desk::has_request)
