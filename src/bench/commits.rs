@@ -97,7 +97,7 @@ pub(super) fn visible(
     writer.go()?;
     let deadline = Instant::now() + PATIENCE;
     let mut last = 0;
-    while last < effort.stamps {
+    while last != peer::LAST_STAMP {
         if Instant::now() > deadline {
             return Err(Failure::internal("the stamps stopped coming"));
         }
@@ -106,11 +106,13 @@ pub(super) fn visible(
         snapshot = session.snapshot().map_err(Failure::internal)?;
         let read = peer::read_stamp(&snapshot).map_err(Failure::internal)?;
         let seen = peer::clock();
-        if let Some((number, stamp)) = read
-            && number > last
+        if let Some(stamp) = read
+            && stamp > last
         {
-            last = number;
-            samples.push(seen.saturating_sub(stamp));
+            last = stamp;
+            if stamp != peer::LAST_STAMP {
+                samples.push(seen.saturating_sub(stamp));
+            }
         }
     }
     peer::stand(&all)?;

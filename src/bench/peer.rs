@@ -159,7 +159,10 @@ fn bare(instance: &Instance, spin: Duration) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Commits the time and how many times it did, again and again.
+/// What is stamped last: nothing comes after it.
+pub(super) const LAST_STAMP: u64 = u64::MAX;
+
+/// Commits the time so many times, and that it was the last.
 fn stamp(instance: &Instance, times: u64) -> Result<(), Failure> {
     let mut session = attach(instance, "stamper")?;
     session.set_spin(PATIENCE);
@@ -168,17 +171,19 @@ fn stamp(instance: &Instance, times: u64) -> Result<(), Failure> {
     std::io::stdin()
         .read_exact(&mut [0; 3])
         .map_err(Failure::internal)?;
-    for number in 1..=times {
+    for number in 0..=times {
         // Others have time to see each; the time is taken after the wait.
         let pause = Instant::now();
         while pause.elapsed() < Duration::from_micros(50) {
             std::hint::spin_loop();
         }
         let mut transaction = Transaction::new();
-        transaction.set(NodeId(1), "stamp", Value::U64List(vec![number, 0]));
+        transaction.set(NodeId(1), "stamp", LAST_STAMP);
         // Last: what is measured begins with the call of `commit`.
-        if let [Operation::SetAttribute { value, .. }] = transaction.operations.as_mut_slice() {
-            *value = Value::U64List(vec![number, clock()]);
+        if let [Operation::SetAttribute { value, .. }] = transaction.operations.as_mut_slice()
+            && number < times
+        {
+            *value = Value::U64(clock());
         }
         let committed = session.commit(&transaction, Time::default());
         committed.map_err(Failure::internal)?;
@@ -186,15 +191,15 @@ fn stamp(instance: &Instance, times: u64) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The number and time of the last stamp.
-pub(super) fn read_stamp(snapshot: &Snapshot) -> Result<Option<(u64, u64)>, ReadError> {
+/// The time of the last stamp.
+pub(super) fn read_stamp(snapshot: &Snapshot) -> Result<Option<u64>, ReadError> {
     let Some(name) = snapshot.schema().find_attribute("stamp") else {
         return Ok(None);
     };
     let node = snapshot.find_node(NodeId(1))?;
     let value = node.map(|node| node.attribute(name)).transpose()?.flatten();
     Ok(match value.map(|attribute| attribute.value) {
-        Some(Value::U64List(row)) => row.first_chunk().map(|&[number, time]| (number, time)),
+        Some(Value::U64(time)) => Some(time),
         _ => None,
     })
 }
