@@ -3,7 +3,7 @@
 //! Guarantee: every diagnostic points into the file it speaks of, and renders with miette.
 
 use crate::{SourceFile, Span};
-use miette::{LabeledSpan, MietteError, SourceCode, SourceSpan, SpanContents};
+use miette::{LabeledSpan, SourceCode};
 use std::fmt;
 
 /// One defect of a grammar or goal file.
@@ -346,33 +346,10 @@ impl miette::Diagnostic for Diagnostic {
             Problem::Expected { expected, .. } => format!("expected {expected}"),
             _ => "here".to_owned(),
         };
-        let here = LabeledSpan::new_primary_with_span(Some(here), source_span(self.span));
+        let here = LabeledSpan::new_primary_with_span(Some(here), self.file.underlined(self.span));
         let related = self.related.as_ref().map(|(span, words)| {
-            LabeledSpan::new_with_span(Some(words.clone()), source_span(*span))
+            LabeledSpan::new_with_span(Some(words.clone()), self.file.underlined(*span))
         });
         Some(Box::new(std::iter::once(here).chain(related)))
-    }
-}
-
-fn source_span(span: Span) -> SourceSpan {
-    SourceSpan::new(span.start.into(), span.end.saturating_sub(span.start))
-}
-
-impl SourceCode for SourceFile {
-    fn read_span<'a>(
-        &'a self,
-        span: &SourceSpan,
-        lines_before: usize,
-        lines_after: usize,
-    ) -> Result<Box<dyn SpanContents<'a> + 'a>, MietteError> {
-        let contents = self.text().read_span(span, lines_before, lines_after)?;
-        Ok(Box::new(miette::MietteSpanContents::new_named(
-            self.name().to_owned(),
-            contents.data(),
-            *contents.span(),
-            contents.line(),
-            contents.column(),
-            contents.line_count(),
-        )))
     }
 }

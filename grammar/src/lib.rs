@@ -70,6 +70,7 @@ mod binding;
 mod check;
 mod diagnostic;
 mod dot;
+mod excerpt;
 mod goal;
 mod grammar;
 mod lexer;
@@ -96,7 +97,7 @@ pub use grammar::{
     Combo, ComboStep, ComboVariable, Constant, Goal, Grammar, Include, Property, TypeDeclaration,
     Types,
 };
-pub use load::{Defects, Loader, has_errors, load_grammar, parse_goal, parse_grammar};
+pub use load::{Defects, Loader, SHOWN_LIMIT, has_errors, load_grammar, parse_goal, parse_grammar};
 pub use matching::{
     CHOICE_LIMIT, End, MatchDelta, MatchError, Matcher, Matches, Obstacle, RuleMatch, SEARCH_LIMIT,
     SearchPlan, SearchStep, ValueError, Watch,

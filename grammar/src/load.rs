@@ -113,17 +113,35 @@ pub fn has_errors(diagnostics: &[Diagnostic]) -> bool {
         .any(|diagnostic| diagnostic.severity() == Severity::Error)
 }
 
+/// Of one error's defects no more than this are shown.
+pub const SHOWN_LIMIT: usize = 100;
+
 /// Everything that is wrong with a file, as one error.
+///
+/// Shown are at most [`SHOWN_LIMIT`] of the defects, the most severe before others, and how many more there are.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Defects {
     /// In the order of the file.
     pub diagnostics: Vec<Diagnostic>,
 }
 
+impl Defects {
+    /// Those that are shown, in the order of the file.
+    fn shown(&self) -> impl Iterator<Item = &Diagnostic> {
+        let mut places: Vec<usize> = (0..self.diagnostics.len()).collect();
+        if places.len() > SHOWN_LIMIT {
+            places.sort_by_key(|&place| std::cmp::Reverse(self.diagnostics[place].severity()));
+            places.truncate(SHOWN_LIMIT);
+            places.sort_unstable();
+        }
+        places.into_iter().map(|place| &self.diagnostics[place])
+    }
+}
+
 impl fmt::Display for Defects {
     /// One line per defect: `file:line:column: severity: message`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (index, diagnostic) in self.diagnostics.iter().enumerate() {
+        for (index, diagnostic) in self.shown().enumerate() {
             if index > 0 {
                 writeln!(f)?;
             }
@@ -134,7 +152,10 @@ impl fmt::Display for Defects {
                 write!(f, " ({help})")?;
             }
         }
-        Ok(())
+        match self.diagnostics.len().saturating_sub(SHOWN_LIMIT) {
+            0 => Ok(()),
+            more => write!(f, "\nand {more} more"),
+        }
     }
 }
 
@@ -142,9 +163,7 @@ impl std::error::Error for Defects {}
 
 impl miette::Diagnostic for Defects {
     fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn miette::Diagnostic> + 'a>> {
-        Some(Box::new(
-            self.diagnostics.iter().map(|diagnostic| diagnostic as _),
-        ))
+        Some(Box::new(self.shown().map(|diagnostic| diagnostic as _)))
     }
 }
 

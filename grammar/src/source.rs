@@ -136,19 +136,43 @@ impl fmt::Debug for Name {
     }
 }
 
+/// From so many bytes to the next, a file remembers line and column, so that finding those of a place costs
+/// the same in a file of one long line.
+const STRIDE: usize = 1024;
+
 /// A file as it was read: its name for messages and its text. Cloning shares the text.
 #[derive(Clone, PartialEq, Eq)]
 pub struct SourceFile {
     name: Arc<str>,
     text: Arc<str>,
+    /// Line and column, from 0, of the first character at or after each multiple of [`STRIDE`].
+    marks: Arc<[(usize, usize)]>,
+}
+
+/// Where one is after `text`, coming from line and column.
+fn after(text: &str, (line, column): (usize, usize)) -> (usize, usize) {
+    match text.rfind('\n') {
+        None => (line, column + text.chars().count()),
+        Some(last) => {
+            let more = text.bytes().filter(|&byte| byte == b'\n').count();
+            (line + more, text[last + 1..].chars().count())
+        }
+    }
 }
 
 impl SourceFile {
     /// A file called `name` in messages, holding `text`.
     pub fn new(name: &str, text: &str) -> Self {
+        let mut marks = vec![(0, 0)];
+        for place in (STRIDE..text.len()).step_by(STRIDE) {
+            let from = text.ceil_char_boundary(place - STRIDE);
+            let piece = &text[from..text.ceil_char_boundary(place)];
+            marks.push(after(piece, marks[marks.len() - 1]));
+        }
         Self {
             name: name.into(),
             text: text.into(),
+            marks: marks.into(),
         }
     }
 
@@ -166,14 +190,15 @@ impl SourceFile {
     ///
     /// An offset past the end gives the place after the last character.
     pub fn line_and_column(&self, offset: usize) -> (usize, usize) {
-        let mut end = offset.min(self.text.len());
-        while !self.text.is_char_boundary(end) {
-            end -= 1;
+        let end = self.text.floor_char_boundary(offset);
+        // The mark before, or the one before that where the mark itself is moved past the place.
+        let from = |mark: usize| self.text.ceil_char_boundary(mark * STRIDE);
+        let mut mark = (end / STRIDE).min(self.marks.len() - 1);
+        while from(mark) > end {
+            mark -= 1;
         }
-        let before = &self.text[..end];
-        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
-        let line = before.bytes().filter(|&byte| byte == b'\n').count() + 1;
-        (line, before[line_start..].chars().count() + 1)
+        let (line, column) = after(&self.text[from(mark)..end], self.marks[mark]);
+        (line + 1, column + 1)
     }
 }
 
@@ -194,6 +219,24 @@ mod tests {
         let arrow = file.text().find("->").unwrap();
         assert_eq!(file.line_and_column(arrow), (2, 6));
         assert_eq!(file.line_and_column(10_000), (3, 1));
+    }
+
+    #[test]
+    fn places_in_long_files_are_found_from_the_mark_before() {
+        // Lines and characters of every length, so that marks fall into the midst of both.
+        let line = |n: usize| "añ€😀".repeat(n * 37 % 211);
+        let text: String = (0..60).map(|n| line(n) + "\n").collect();
+        assert!(text.len() > 20 * STRIDE);
+        let file = SourceFile::new("a.aggl", &text);
+        let (mut line, mut column) = (1, 1);
+        for (place, character) in text.char_indices() {
+            assert_eq!(file.line_and_column(place), (line, column), "at {place}");
+            (line, column) = match character {
+                '\n' => (line + 1, 1),
+                _ => (line, column + 1),
+            };
+        }
+        assert_eq!(file.line_and_column(text.len()), (line, column));
     }
 
     #[test]

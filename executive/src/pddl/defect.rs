@@ -2,7 +2,7 @@
 //! it speaks of.
 
 use grammar::{SourceFile, Span};
-use miette::{LabeledSpan, SourceCode, SourceSpan};
+use miette::{LabeledSpan, SourceCode};
 use std::fmt;
 use thiserror::Error;
 
@@ -183,13 +183,11 @@ impl miette::Diagnostic for Defect {
     }
 
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        let length = self.span.end.saturating_sub(self.span.start);
-        let span = SourceSpan::new(self.span.start.into(), length);
         let here = match &self.problem {
             Problem::Expected { expected, .. } => format!("expected {expected}"),
             _ => "here".to_owned(),
         };
-        let label = LabeledSpan::new_primary_with_span(Some(here), span);
+        let label = LabeledSpan::new_primary_with_span(Some(here), self.file.underlined(self.span));
         Some(Box::new(std::iter::once(label)))
     }
 }
