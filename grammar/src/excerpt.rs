@@ -132,8 +132,16 @@ mod tests {
         let near = rendered
             .lines()
             .skip_while(|line| !line.contains("[long.aggl:3:"));
-        let near: Vec<&str> = near.map(str::trim_end).take(4).collect();
-        expect![[r#""#]].assert_eq(&near.join("\n"));
+        let near: Vec<String> = near
+            .map(|line| format!("|{}", line.trim_end()))
+            .take(4)
+            .collect();
+        expect![[r#"
+            |   ╭─[long.aggl:3:2772]
+            | 3 │ active(1) { { a:t b:t a->b(l) } => { a:t b:t } } r99 : active(1) { { a:t b:t a->señal(l) } => { a:t b:t } } r0 : active(1) { { a:t b:t a->b(l) } => { a:t b:t } } r1
+            |   ·                                                                                 ──┬──
+            |   ·                                                                                   ╰── here"#]]
+        .assert_eq(&near.join("\n"));
     }
 
     #[test]

@@ -219,6 +219,18 @@ impl Comparison {
             Self::GreaterOrEqual => ">=",
         }
     }
+
+    /// The comparison that holds of two values with an order where this one does not.
+    pub const fn negated(self) -> Self {
+        match self {
+            Self::Equal => Self::NotEqual,
+            Self::NotEqual => Self::Equal,
+            Self::Less => Self::GreaterOrEqual,
+            Self::LessOrEqual => Self::Greater,
+            Self::Greater => Self::LessOrEqual,
+            Self::GreaterOrEqual => Self::Less,
+        }
+    }
 }
 
 /// A value computed at a binding.

@@ -2,12 +2,15 @@
 //!
 //! Guarantee: a draft never has a link that something asked not to be there.
 
-use crate::{AttributePath, Comparison, Condition, Expression, Literal, Types};
+use crate::{AttributePath, Comparison, Condition, Expression, Literal, PatternNode, Types};
 use dsr::{EdgeRef, Transaction, Value};
+use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// How many ways to meet a condition are followed.
-const WAYS: usize = 8;
+const WAYS: usize = 16;
+/// How many formulas are looked at for one graph, each as often as there are ways to come to it.
+const FORMULAS: usize = 1_000;
 
 pub(super) type Link = (usize, String, usize);
 /// Variables and the nodes of the draft that they stand for.
@@ -19,7 +22,7 @@ enum Owner {
     Link(Link),
 }
 
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Draft {
     /// Names and types.
     pub(super) nodes: Vec<(String, String)>,
@@ -115,109 +118,209 @@ impl Draft {
     }
 }
 
-/// Ways to make a condition come out as `holds`. What a `forall` asks is left to be seen.
-pub(super) fn ways(
-    types: &Types,
-    draft: Draft,
-    places: &Places,
-    condition: &Condition,
-    holds: bool,
-) -> Vec<Draft> {
-    let mut found = match (condition, holds) {
-        (Condition::Edge { label, from, to }, _) => {
-            let (Some(&from), Some(&to)) = (places.get(&**from), places.get(&**to)) else {
-                return vec![draft];
-            };
-            draft.with_link((from, label.to_string(), to), holds)
+/// Finds ways to make conditions come out one way or the other, and so that little would change it.
+pub(super) struct Ways<'t> {
+    types: &'t Types,
+    /// So many formulas are still looked at.
+    left: Cell<usize>,
+}
+
+impl<'t> Ways<'t> {
+    pub(super) fn new(types: &'t Types) -> Self {
+        Self {
+            types,
+            left: Cell::new(FORMULAS),
         }
-        (Condition::Same(a, b), _) => {
-            let same = places.get(&**a) == places.get(&**b);
-            if same == holds {
-                vec![draft]
-            } else {
-                Vec::new()
+    }
+
+    /// How many formulas were looked at until now.
+    pub(super) fn looked_at(&self) -> u64 {
+        (FORMULAS - self.left.get()) as u64
+    }
+
+    /// Ways to make a condition come out as `holds`, the smallest first.
+    pub(super) fn to(
+        &self,
+        draft: Draft,
+        places: &Places,
+        condition: &Condition,
+        holds: bool,
+    ) -> Vec<Draft> {
+        let Some(left) = self.left.get().checked_sub(1) else {
+            return vec![draft];
+        };
+        self.left.set(left);
+        let mut found = self.all(draft, places, condition, holds);
+        found.sort_by_key(|draft| (draft.nodes.len(), draft.links.len()));
+        found.dedup();
+        found.truncate(WAYS);
+        found
+    }
+
+    fn all(&self, draft: Draft, places: &Places, condition: &Condition, holds: bool) -> Vec<Draft> {
+        match (condition, holds) {
+            (Condition::Edge { label, from, to }, _) => {
+                let (Some(&from), Some(&to)) = (places.get(&**from), places.get(&**to)) else {
+                    return vec![draft];
+                };
+                draft.with_link((from, label.to_string(), to), holds)
             }
-        }
-        (
-            Condition::Compare {
-                operator,
-                left,
-                right,
-            },
-            true,
-        ) => compared(draft, places, *operator, left, right),
-        (Condition::Not(inner), _) => ways(types, draft, places, inner, !holds),
-        (Condition::And(all), true) | (Condition::Or(all), false) => {
-            let mut drafts = vec![draft];
-            for condition in all {
-                drafts = drafts
-                    .into_iter()
-                    .flat_map(|draft| ways(types, draft, places, condition, holds))
-                    .take(WAYS)
-                    .collect();
-            }
-            drafts
-        }
-        (Condition::Or(any), true) | (Condition::And(any), false) => any
-            .iter()
-            .flat_map(|condition| ways(types, draft.clone(), places, condition, holds))
-            .collect(),
-        (
-            Condition::When {
-                condition,
-                consequence,
-            },
-            true,
-        ) => {
-            let mut without = ways(types, draft.clone(), places, condition, false);
-            without.extend(ways(types, draft, places, consequence, true));
-            without
-        }
-        (
-            Condition::When {
-                condition,
-                consequence,
-            },
-            false,
-        ) => ways(types, draft, places, condition, true)
-            .into_iter()
-            .flat_map(|draft| ways(types, draft, places, consequence, false))
-            .collect(),
-        (Condition::Exists { variables, body }, true)
-        | (Condition::Forall { variables, body }, false) => {
-            let mut drafts = vec![(draft, places.clone())];
-            for variable in variables {
-                let mut next = Vec::new();
-                for (draft, places) in drafts {
-                    let choose = |node: usize| {
-                        let mut places = places.clone();
-                        places.insert(variable.variable.to_string(), node);
-                        places
-                    };
-                    for (index, (_, exact)) in draft.nodes.iter().enumerate() {
-                        if types.is_subtype(exact, &variable.type_name) {
-                            next.push((draft.clone(), choose(index)));
-                        }
-                    }
-                    let mut more = draft.clone();
-                    let name = more.fresh(&variable.variable);
-                    more.nodes.push((name, variable.type_name.to_string()));
-                    let place = choose(more.nodes.len() - 1);
-                    next.push((more, place));
+            (Condition::Same(a, b), _) => {
+                let same = places.get(&**a) == places.get(&**b);
+                if same == holds {
+                    vec![draft]
+                } else {
+                    Vec::new()
                 }
-                next.truncate(WAYS * WAYS);
-                drafts = next;
             }
-            let meet = |(draft, places): (Draft, Places)| ways(types, draft, &places, body, holds);
-            drafts.into_iter().flat_map(meet).collect()
+            (
+                Condition::Compare {
+                    operator,
+                    left,
+                    right,
+                },
+                _,
+            ) => {
+                if holds {
+                    return compared(draft, places, *operator, left, right);
+                }
+                // A missing attribute will do, too.
+                let mut found = vec![draft.clone()];
+                found.extend(compared(draft, places, operator.negated(), left, right));
+                found
+            }
+            (Condition::Not(inner), _) => self.to(draft, places, inner, !holds),
+            (Condition::And(all), true) | (Condition::Or(all), false) => {
+                let all = all.iter().map(|condition| (condition, holds));
+                self.every(draft, places, all)
+            }
+            (Condition::Or(any), true) | (Condition::And(any), false) => {
+                let mut found = Vec::new();
+                for one in any {
+                    found.extend(self.to(draft.clone(), places, one, holds));
+                    // As the only one: so that without it the whole comes out the other way.
+                    let only = any.iter().map(|c| (c, (c == one) == holds));
+                    found.extend(self.every(draft.clone(), places, only));
+                }
+                found
+            }
+            (
+                Condition::When {
+                    condition,
+                    consequence,
+                },
+                true,
+            ) => {
+                let (condition, consequence) = (&**condition, &**consequence);
+                let mut found = self.to(draft.clone(), places, condition, false);
+                found.extend(self.to(draft.clone(), places, consequence, true));
+                for both in [true, false] {
+                    let both = [(condition, both), (consequence, both)];
+                    found.extend(self.every(draft.clone(), places, both.into_iter()));
+                }
+                found
+            }
+            (
+                Condition::When {
+                    condition,
+                    consequence,
+                },
+                false,
+            ) => {
+                let broken = [(&**condition, true), (&**consequence, false)];
+                self.every(draft, places, broken.into_iter())
+            }
+            (Condition::Exists { variables, body }, true)
+            | (Condition::Forall { variables, body }, false) => {
+                let mut found = Vec::new();
+                for (draft, chosen) in self.chosen(draft, places, variables, true) {
+                    for draft in self.to(draft, &chosen, body, holds) {
+                        found.push(draft.clone());
+                        // By these nodes alone: so that without them it comes out the other way.
+                        let mut only = vec![draft.clone()];
+                        for (_, other) in self.chosen(draft, places, variables, false) {
+                            if other != chosen {
+                                let more = only.into_iter();
+                                let more = more.flat_map(|d| self.to(d, &other, body, !holds));
+                                only = more.take(WAYS).collect();
+                            }
+                        }
+                        found.extend(only);
+                    }
+                }
+                found
+            }
+            // It may hold as it is, by all nodes that are there, and so that it hinges on some of them.
+            (Condition::Exists { variables, body }, false)
+            | (Condition::Forall { variables, body }, true) => {
+                let mut found = vec![draft.clone()];
+                let mut by_all = vec![draft.clone()];
+                for (_, places) in self.chosen(draft.clone(), places, variables, false) {
+                    let more = by_all.into_iter();
+                    let more = more.flat_map(|draft| self.to(draft, &places, body, holds));
+                    by_all = more.take(WAYS).collect();
+                }
+                found.extend(by_all);
+                for (draft, places) in self.chosen(draft, places, variables, true) {
+                    found.extend(self.to(draft, &places, body, holds));
+                }
+                found
+            }
         }
-        // A missing attribute will do; what a quantifier forbids is left to be seen.
-        (Condition::Compare { .. } | Condition::Exists { .. }, false)
-        | (Condition::Forall { .. }, true) => vec![draft],
-    };
-    found.sort_by_key(|draft| (draft.nodes.len(), draft.links.len()));
-    found.truncate(WAYS);
-    found
+    }
+
+    fn every<'c>(
+        &self,
+        draft: Draft,
+        places: &Places,
+        all: impl Iterator<Item = (&'c Condition, bool)>,
+    ) -> Vec<Draft> {
+        let mut drafts = vec![draft];
+        for (condition, holds) in all {
+            drafts = drafts
+                .into_iter()
+                .flat_map(|draft| self.to(draft, places, condition, holds))
+                .take(WAYS)
+                .collect();
+        }
+        drafts
+    }
+
+    /// The draft with nodes for quantified variables: those that are there and, if `more`, new ones.
+    fn chosen(
+        &self,
+        draft: Draft,
+        places: &Places,
+        variables: &[PatternNode],
+        more: bool,
+    ) -> Vec<(Draft, Places)> {
+        let mut drafts = vec![(draft, places.clone())];
+        for variable in variables {
+            let mut next = Vec::new();
+            for (draft, places) in drafts {
+                let choose = |node: usize| {
+                    let mut places = places.clone();
+                    places.insert(variable.variable.to_string(), node);
+                    places
+                };
+                for (index, (_, exact)) in draft.nodes.iter().enumerate() {
+                    if self.types.is_subtype(exact, &variable.type_name) {
+                        next.push((draft.clone(), choose(index)));
+                    }
+                }
+                if more {
+                    let mut wider = draft.clone();
+                    let name = wider.fresh(&variable.variable);
+                    wider.nodes.push((name, variable.type_name.to_string()));
+                    let place = choose(wider.nodes.len() - 1);
+                    next.push((wider, place));
+                }
+            }
+            next.truncate(WAYS * WAYS);
+            drafts = next;
+        }
+        drafts
+    }
 }
 
 fn owner(path: &AttributePath, places: &Places) -> Option<(Owner, String)> {

@@ -6,12 +6,13 @@
 
 mod complete;
 mod conflict;
+mod kinds;
 mod manifest;
 mod never;
 mod reach;
 mod unused;
 
-pub use conflict::{Conflict, OVERLAY_LIMIT};
+pub use conflict::{CONFLICT_LIMIT, Conflict, Conflicts, EFFORT_LIMIT, OVERLAY_LIMIT};
 
 use crate::parser::Finding;
 use crate::{Diagnostic, Grammar, Name, Problem, SourceFile};
@@ -98,11 +99,11 @@ impl Grammar {
     /// applied the second does not match there any more. A rule can disable another match of
     /// itself.
     ///
-    /// The graph is the smallest overlay of the two left sides, completed by what simple
-    /// preconditions ask for. Of rules so large that there are more than [`OVERLAY_LIMIT`] ways to
-    /// lay one over the other, the others are not looked at; a conflict that needs a graph which a
-    /// quantified precondition describes only indirectly can be missed.
-    pub fn conflicts(&self) -> Vec<Conflict> {
+    /// The graph is the smallest overlay of the two left sides, completed by what preconditions ask for.
+    /// Of rules so large that there are more than [`OVERLAY_LIMIT`] ways to lay one over the other, the
+    /// others are not looked at. No more than [`CONFLICT_LIMIT`] are given, and all together may take no more than
+    /// [`EFFORT_LIMIT`]; pairs of rules that are left then are counted.
+    pub fn conflicts(&self) -> Conflicts {
         conflict::conflicts(self)
     }
 }

@@ -2,11 +2,11 @@
 
 use super::{diagnostics_json, read, warn};
 use crate::commands::graph::read_graph;
-use crate::commands::output::{print, print_json};
+use crate::commands::output::{print, print_json, tell};
 use crate::commands::read_text;
 use crate::{Answer, Failure};
 use dsr::{Graph, Manifest, Schema, Time, json};
-use grammar::{Conflict, Defects, Diagnostic, Grammar, Problem, SourceFile};
+use grammar::{Conflict, Conflicts, Defects, Diagnostic, Grammar, Problem, SourceFile};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -70,8 +70,9 @@ pub(super) fn check(
     let found = if conflicts || as_json {
         grammar.conflicts()
     } else {
-        Vec::new()
+        Conflicts::default()
     };
+    let Conflicts { found, left } = found;
     diagnostics.extend(found.iter().map(|conflict| conflict.diagnostic.clone()));
     diagnostics.sort_by_key(|d| {
         let included = grammar.files.iter().position(|file| *file == d.file);
@@ -89,7 +90,14 @@ pub(super) fn check(
             .collect::<Result<_, Failure>>()?;
         print_json(&json!({
             "diagnostics": diagnostics_json(&diagnostics), "conflicts": conflicts,
+            "conflicts_left": left,
         }))?;
+    }
+    if conflicts && left > 0 {
+        tell(&format!(
+            "note: of {left} pairs of rules it was not found out whether one can disable the other: \
+             there was too much to try\n"
+        ));
     }
     if broken {
         return Err(Failure::Input(Defects { diagnostics }.into()));

@@ -1,0 +1,351 @@
+//! What a rule changes and what it looks at, by type, label and attribute.
+//!
+//! Guarantee: a rule that touches nothing of what another looks at cannot disable it.
+
+use crate::analysis::kinds::{Kind, Kinds};
+use crate::{AttributePath, Condition, Effect, Expression, Name, PatternNode, Rule};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// How a rule comes by a node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum How {
+    /// It is part of the match.
+    Bound,
+    /// The rule makes it.
+    Made,
+    /// A quantifier goes over it.
+    Quantified,
+}
+
+/// A node of a rule.
+#[derive(Debug, Clone, Copy)]
+struct End {
+    kind: Kind,
+    how: How,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Thing<'g> {
+    /// A link, which comes or is looked for (`true`), goes or must not be there (`false`).
+    Link([End; 2], &'g str, Option<bool>),
+    /// A value of a node, or of a link with this label.
+    Value(&'g str, Result<End, &'g str>),
+    /// A node that goes or changes its type, or that is looked at.
+    Node(End, Option<Kind>),
+    /// A node that comes.
+    New(Kind),
+}
+
+/// What a rule changes, and what it looks at.
+pub(super) struct Touched<'g> {
+    changes: Vec<Thing<'g>>,
+    looks: Vec<Thing<'g>>,
+    /// How many variables are quantified over within each other at most.
+    pub(super) depth: u32,
+}
+
+type Scope<'g> = BTreeMap<&'g str, End>;
+
+struct Reader<'a, 'g> {
+    kinds: &'a Kinds<'g>,
+    touched: Touched<'g>,
+}
+
+impl<'g> Touched<'g> {
+    /// Of a rule of which all types are known.
+    pub(super) fn of(kinds: &Kinds<'g>, rule: &'g Rule) -> Self {
+        let mut reader = Reader {
+            kinds,
+            touched: Touched {
+                changes: Vec::new(),
+                looks: Vec::new(),
+                depth: 0,
+            },
+        };
+        let mut scope = Scope::new();
+        for node in rule.bound_nodes() {
+            if let Some(end) = reader.declare(&mut scope, node, How::Bound) {
+                reader.touched.looks.push(Thing::Node(end, None));
+                let after = rule.right.node(&node.variable);
+                let becomes = after.and_then(|after| kinds.find(&after.type_name));
+                let is_parameter = rule.left.node(&node.variable).is_none();
+                if becomes != Some(end.kind) && (after.is_some() || !is_parameter) {
+                    reader.touched.changes.push(Thing::Node(end, becomes));
+                }
+            }
+        }
+        for node in &rule.right.nodes {
+            if !scope.contains_key(&*node.variable)
+                && let Some(end) = reader.declare(&mut scope, node, How::Made)
+            {
+                reader.touched.changes.push(Thing::New(end.kind));
+            }
+        }
+        for edge in &rule.left.edges {
+            let names = (&edge.from, &edge.label, &edge.to);
+            reader.look_at(&scope, names, Some(!edge.negated));
+            let kept = rule.right.edge(&edge.from, &edge.label, &edge.to);
+            if !edge.negated && kept.is_none_or(|kept| kept.negated) {
+                reader.change(&scope, names, false);
+            }
+        }
+        for edge in &rule.right.edges {
+            let before = rule.left.edge(&edge.from, &edge.label, &edge.to);
+            if edge.negated || before.is_none_or(|before| before.negated) {
+                reader.change(&scope, (&edge.from, &edge.label, &edge.to), !edge.negated);
+            }
+        }
+        for condition in rule.precondition.as_slice() {
+            reader.condition(&scope, condition, 0);
+        }
+        reader.effects(&mut scope, &rule.effect, 0);
+        reader.touched
+    }
+
+    /// What [`Self::may_disable`] costs.
+    pub(super) fn checks(&self, other: &Self) -> u64 {
+        (self.changes.len() * other.looks.len()) as u64
+    }
+
+    /// Whether anything that is changed here is of a kind that the other looks at.
+    pub(super) fn may_disable(&self, kinds: &Kinds<'g>, other: &Self) -> bool {
+        let mut changes = self.changes.iter();
+        changes.any(|change| other.looks.iter().any(|look| touches(kinds, change, look)))
+    }
+
+    /// Under which words [`Index`] finds who looks at what is changed here.
+    fn words(things: &[Thing<'g>]) -> BTreeSet<Word<'g>> {
+        things.iter().map(Thing::word).collect()
+    }
+}
+
+impl<'g> Reader<'_, 'g> {
+    fn declare(&self, scope: &mut Scope<'g>, node: &'g PatternNode, how: How) -> Option<End> {
+        let kind = self.kinds.find(&node.type_name)?;
+        let end = End { kind, how };
+        scope.insert(&node.variable, end);
+        Some(end)
+    }
+
+    fn link(
+        scope: &Scope<'g>,
+        (from, label, to): (&'g Name, &'g Name, &'g Name),
+        there: Option<bool>,
+    ) -> Option<Thing<'g>> {
+        let ends = [*scope.get(&**from)?, *scope.get(&**to)?];
+        Some(Thing::Link(ends, label, there))
+    }
+
+    fn change(&mut self, scope: &Scope<'g>, link: (&'g Name, &'g Name, &'g Name), there: bool) {
+        self.touched
+            .changes
+            .extend(Self::link(scope, link, Some(there)));
+    }
+
+    fn look_at(
+        &mut self,
+        scope: &Scope<'g>,
+        link: (&'g Name, &'g Name, &'g Name),
+        there: Option<bool>,
+    ) {
+        self.touched.looks.extend(Self::link(scope, link, there));
+    }
+
+    fn condition(&mut self, scope: &Scope<'g>, condition: &'g Condition, depth: u32) {
+        self.touched.depth = self.touched.depth.max(depth);
+        match condition {
+            Condition::Edge { label, from, to } => self.look_at(scope, (from, label, to), None),
+            Condition::Same(..) => {}
+            Condition::Compare { left, right, .. } => {
+                self.expression(scope, left);
+                self.expression(scope, right);
+            }
+            Condition::Not(inner) => self.condition(scope, inner, depth),
+            Condition::And(all) | Condition::Or(all) => {
+                for inner in all {
+                    self.condition(scope, inner, depth);
+                }
+            }
+            Condition::Exists { variables, body } | Condition::Forall { variables, body } => {
+                let mut scope = scope.clone();
+                for node in variables {
+                    let end = self.declare(&mut scope, node, How::Quantified);
+                    let look = end.map(|end| Thing::Node(end, None));
+                    self.touched.looks.extend(look);
+                }
+                let depth = depth.saturating_add(variables.len() as u32);
+                self.condition(&scope, body, depth);
+            }
+            Condition::When {
+                condition,
+                consequence,
+            } => {
+                self.condition(scope, condition, depth);
+                self.condition(scope, consequence, depth);
+            }
+        }
+    }
+
+    fn value(scope: &Scope<'g>, path: &'g AttributePath) -> Option<Thing<'g>> {
+        Some(match path {
+            AttributePath::Node {
+                variable,
+                attribute,
+            } => Thing::Value(attribute, Ok(*scope.get(&**variable)?)),
+            AttributePath::Edge {
+                label, attribute, ..
+            } => Thing::Value(attribute, Err(label)),
+        })
+    }
+
+    fn expression(&mut self, scope: &Scope<'g>, expression: &'g Expression) {
+        match expression {
+            Expression::Literal(_) => {}
+            Expression::Attribute(path) => {
+                self.touched.looks.extend(Self::value(scope, path));
+                if let AttributePath::Edge {
+                    from, label, to, ..
+                } = path
+                {
+                    self.look_at(scope, (from, label, to), None);
+                }
+            }
+            Expression::Arithmetic { operands, .. } => {
+                for operand in operands {
+                    self.expression(scope, operand);
+                }
+            }
+        }
+    }
+
+    fn effects(&mut self, scope: &mut Scope<'g>, effects: &'g [Effect], depth: u32) {
+        self.touched.depth = self.touched.depth.max(depth);
+        for effect in effects {
+            match effect {
+                Effect::Link { label, from, to } => self.change(scope, (from, label, to), true),
+                Effect::Unlink { label, from, to } => self.change(scope, (from, label, to), false),
+                Effect::Assign { target, .. } => {
+                    self.touched.changes.extend(Self::value(scope, target));
+                }
+                Effect::Create {
+                    variable,
+                    type_name,
+                } => {
+                    if let Some(kind) = self.kinds.find(type_name) {
+                        let how = How::Made;
+                        scope.insert(variable, End { kind, how });
+                        self.touched.changes.push(Thing::New(kind));
+                    }
+                }
+                Effect::Delete { variable } => {
+                    let gone = scope.get(&**variable).map(|end| Thing::Node(*end, None));
+                    self.touched.changes.extend(gone);
+                }
+                Effect::Retype {
+                    variable,
+                    type_name,
+                } => {
+                    let becomes = self.kinds.find(type_name);
+                    let end = scope.get(&**variable);
+                    let change = end.map(|end| Thing::Node(*end, becomes));
+                    self.touched.changes.extend(change);
+                }
+                Effect::Forall { variables, body } => {
+                    let mut scope = scope.clone();
+                    for node in variables {
+                        self.declare(&mut scope, node, How::Quantified);
+                    }
+                    let depth = depth.saturating_add(variables.len() as u32);
+                    self.effects(&mut scope, body, depth);
+                }
+                Effect::When { condition, body } => {
+                    // What a condition of an effect looks at decides nothing about the match.
+                    let looks = self.touched.looks.len();
+                    self.condition(scope, condition, depth);
+                    self.touched.looks.truncate(looks);
+                    self.effects(&mut scope.clone(), body, depth);
+                }
+            }
+        }
+    }
+}
+
+/// What things must have in common to touch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Word<'g> {
+    Label(&'g str),
+    Attribute(&'g str),
+    Node,
+}
+
+impl<'g> Thing<'g> {
+    fn word(&self) -> Word<'g> {
+        match self {
+            Thing::Link(_, label, _) => Word::Label(label),
+            Thing::Value(attribute, _) => Word::Attribute(attribute),
+            Thing::Node(..) | Thing::New(_) => Word::Node,
+        }
+    }
+}
+
+/// Whether a node that one changes can be one that the other looks at.
+fn meet(kinds: &Kinds, changed: End, looked_at: End) -> bool {
+    match (changed.how, looked_at.how) {
+        (How::Made, How::Bound) => false,
+        (How::Made, _) => kinds.is_subtype(changed.kind, looked_at.kind),
+        _ => kinds.common(changed.kind, looked_at.kind).is_some(),
+    }
+}
+
+fn touches(kinds: &Kinds, change: &Thing, look: &Thing) -> bool {
+    match (change, look) {
+        (Thing::Link(ends, label, comes), Thing::Link(others, other, wanted)) => {
+            let pairs = ends.iter().zip(others);
+            label == other
+                && (wanted.is_none() || comes != wanted)
+                && pairs.into_iter().all(|(a, b)| meet(kinds, *a, *b))
+        }
+        (Thing::Value(attribute, owner), Thing::Value(other, others)) => {
+            attribute == other
+                && match (owner, others) {
+                    (Ok(node), Ok(other)) => meet(kinds, *node, *other),
+                    (Err(label), Err(other)) => label == other,
+                    _ => false,
+                }
+        }
+        (Thing::Node(end, becomes), Thing::Node(other, _)) => {
+            let is = |kind: &Kind| kinds.is_subtype(*kind, other.kind);
+            match other.how {
+                How::Bound => meet(kinds, *end, *other) && !becomes.as_ref().is_some_and(is),
+                _ => meet(kinds, *end, *other) || becomes.as_ref().is_some_and(is),
+            }
+        }
+        (Thing::New(kind), Thing::Node(other, _)) => {
+            other.how == How::Quantified && kinds.is_subtype(*kind, other.kind)
+        }
+        _ => false,
+    }
+}
+
+/// Which rules look at something under a word.
+#[derive(Default)]
+pub(super) struct Index<'g>(BTreeMap<Word<'g>, Vec<usize>>);
+
+impl<'g> Index<'g> {
+    pub(super) fn new(all: &[Touched<'g>]) -> Self {
+        let mut index = BTreeMap::<Word, Vec<usize>>::new();
+        for (rule, touched) in all.iter().enumerate() {
+            for word in Touched::words(&touched.looks) {
+                index.entry(word).or_default().push(rule);
+            }
+        }
+        Self(index)
+    }
+
+    /// The rules that look at something of what is changed, in their order.
+    pub(super) fn of(&self, changer: &Touched<'g>) -> BTreeSet<usize> {
+        let words = Touched::words(&changer.changes).into_iter();
+        let rules = words.filter_map(|word| self.0.get(&word)).flatten();
+        rules.copied().collect()
+    }
+}

@@ -1,0 +1,84 @@
+//! Types by number, with what inherits from them.
+//!
+//! Guarantee: it agrees with [`Types::is_subtype`](crate::Types::is_subtype), at the cost of a few words.
+
+use crate::Grammar;
+use std::collections::BTreeMap;
+
+/// A type's number.
+pub(super) type Kind = usize;
+
+/// The types that a grammar declares, inherits from or uses.
+pub(super) struct Kinds<'g> {
+    numbers: BTreeMap<&'g str, Kind>,
+    names: Vec<&'g str>,
+    /// By type, which inherit from it, itself included: a bit each.
+    below: Vec<Vec<u64>>,
+}
+
+impl<'g> Kinds<'g> {
+    /// Those of the grammar, declared ones first in the order written, and `used` ones.
+    pub(super) fn new(grammar: &'g Grammar, used: impl Iterator<Item = &'g str>) -> Self {
+        let mut numbers = BTreeMap::new();
+        let mut names = Vec::new();
+        let declarations = &grammar.types.declarations;
+        let declared = declarations.iter().flat_map(|d| &d.names);
+        let parents = declarations.iter().flat_map(|d| &d.parents);
+        let written = declared.chain(parents).map(|name| name.as_str());
+        for name in written.chain(used) {
+            numbers.entry(name).or_insert_with(|| {
+                names.push(name);
+                names.len() - 1
+            });
+        }
+        let mut parents = vec![Vec::new(); names.len()];
+        for declaration in declarations {
+            for name in &declaration.names {
+                let above = declaration.parents.iter().map(|parent| numbers[&**parent]);
+                parents[numbers[&**name]].extend(above);
+            }
+        }
+        let mut below = vec![vec![0_u64; names.len().div_ceil(64)]; names.len()];
+        for kind in 0..names.len() {
+            let mut reached = vec![kind];
+            while let Some(next) = reached.pop() {
+                let bit = 1 << (kind % 64);
+                if below[next][kind / 64] & bit == 0 {
+                    below[next][kind / 64] |= bit;
+                    reached.extend(&parents[next]);
+                }
+            }
+        }
+        Self {
+            numbers,
+            names,
+            below,
+        }
+    }
+
+    pub(super) fn find(&self, name: &str) -> Option<Kind> {
+        self.numbers.get(name).copied()
+    }
+
+    pub(super) fn name(&self, kind: Kind) -> &'g str {
+        self.names[kind]
+    }
+
+    pub(super) fn is_subtype(&self, sub: Kind, ancestor: Kind) -> bool {
+        self.below[ancestor][sub / 64] & (1 << (sub % 64)) != 0
+    }
+
+    /// A type that is both: one of the two where that is, else the first declared.
+    pub(super) fn common(&self, one: Kind, other: Kind) -> Option<Kind> {
+        if self.is_subtype(one, other) {
+            return Some(one);
+        }
+        if self.is_subtype(other, one) {
+            return Some(other);
+        }
+        let words = self.below[one].iter().zip(&self.below[other]);
+        let mut both = words.map(|(a, b)| a & b).enumerate();
+        both.find(|(_, word)| *word != 0)
+            .map(|(index, word)| 64 * index + word.trailing_zeros() as usize)
+    }
+}
