@@ -318,6 +318,14 @@ pub(crate) enum RulesAction {
         /// Count the matches without listing them
         #[arg(long)]
         count: bool,
+        /// List no more than so many matches of a rule; all are counted
+        #[arg(
+            long,
+            value_name = "N",
+            default_value_t = 10_000,
+            conflicts_with = "count"
+        )]
+        limit: usize,
     },
     /// Show in which order a rule's nodes are searched for, and what each step comes to
     #[command(

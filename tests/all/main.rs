@@ -19,6 +19,7 @@ mod hostile;
 mod hot;
 mod inspect;
 mod large;
+mod large_rules;
 mod leftovers;
 mod live_rules;
 mod missions;

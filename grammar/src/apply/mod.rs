@@ -79,7 +79,7 @@ impl From<Interrupt> for ApplyError {
     fn from(interrupt: Interrupt) -> Self {
         match interrupt {
             Interrupt::Read(error) => error.into(),
-            Interrupt::Limit(_) => Self::TooMuch {
+            Interrupt::Limit(_) | Interrupt::Whole(_) => Self::TooMuch {
                 changes: CHANGE_LIMIT,
                 choices: CHOICE_LIMIT,
             },

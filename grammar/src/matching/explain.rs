@@ -3,7 +3,7 @@
 //! Guarantee: what is shown is the plan that a search for the same rule in the same snapshot goes
 //! by.
 
-use super::environment::Interrupt;
+use super::environment::{Interrupt, WHOLE_LIMIT};
 use super::plan::{Plan, Source, plan};
 use super::query::{Problem, Query};
 use super::search::Search;
@@ -27,8 +27,8 @@ pub struct SearchPlan {
     /// Whether the counts are the graph's own, not what is taken for granted where there is none:
     /// a hundred nodes of a type, two links of a label at each.
     pub counted: bool,
-    /// How many nodes had been tried for one match when the search was given up: what its steps found
-    /// is what they found until then.
+    /// How many nodes had been tried, for one match ([`SEARCH_LIMIT`](crate::SEARCH_LIMIT)) or for all of them
+    /// ([`WHOLE_LIMIT`]), when the search was given up: what its steps found is what they found until then.
     pub given_up: Option<u64>,
 }
 
@@ -61,6 +61,20 @@ impl Grammar {
         rule: &Rule,
         partial: &Binding,
     ) -> Result<SearchPlan, MatchError> {
+        self.search_plan_within(snapshot, rule, partial, WHOLE_LIMIT)
+    }
+
+    /// The same, where the whole search tries no more nodes than `limit`.
+    ///
+    /// # Errors
+    /// [`MatchError`], as for [`Self::matches`].
+    pub fn search_plan_within(
+        &self,
+        snapshot: Option<&Snapshot>,
+        rule: &Rule,
+        partial: &Binding,
+        limit: u64,
+    ) -> Result<SearchPlan, MatchError> {
         let assumed;
         let schema = match snapshot {
             Some(snapshot) => snapshot.schema(),
@@ -76,7 +90,7 @@ impl Grammar {
             None => Statistics::assumed(&query),
         };
         let plan = Arc::new(plan(&query, &statistics, &problem.given()));
-        let seen = snapshot.map(|snapshot| run(snapshot, problem, &plan));
+        let seen = snapshot.map(|snapshot| run(snapshot, problem, &plan, limit));
         let (seen, given_up) = seen.transpose()?.unzip();
         let words = Words {
             rule,
@@ -178,13 +192,19 @@ fn condition_names(condition: &Condition, add: &mut Add<'_>) {
 /// and the limit that ended it.
 type Seen = (Vec<[u64; 2]>, Option<u64>);
 
-fn run(snapshot: &Snapshot, problem: Problem, plan: &Arc<Plan>) -> Result<Seen, MatchError> {
+fn run(
+    snapshot: &Snapshot,
+    mut problem: Problem,
+    plan: &Arc<Plan>,
+    limit: u64,
+) -> Result<Seen, MatchError> {
+    problem.environment.set_whole_limit(limit);
     let mut search = Search::new(snapshot, problem, Arc::clone(plan));
     let given_up = loop {
         match search.advance() {
             Ok(true) => {}
             Ok(false) => break None,
-            Err(Interrupt::Limit(limit)) => break Some(limit),
+            Err(Interrupt::Limit(limit) | Interrupt::Whole(limit)) => break Some(limit),
             Err(error) => return Err(error.into()),
         }
     };
@@ -250,7 +270,7 @@ mod tests {
         let query = Arc::clone(&problem.query);
         let order = plan(&query, &Statistics::assumed(&query), &[]);
         problem.environment.set_limit(1000);
-        let (seen, given_up) = run(&snapshot, problem, &Arc::new(order)).unwrap();
+        let (seen, given_up) = run(&snapshot, problem, &Arc::new(order), WHOLE_LIMIT).unwrap();
         assert_eq!(given_up, Some(1000));
         let tried: u64 = seen.iter().map(|[candidates, _]| candidates).sum();
         assert!((900..=1000).contains(&tried), "{seen:?}");

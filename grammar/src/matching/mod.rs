@@ -12,6 +12,7 @@ mod explain;
 mod frame;
 mod host;
 mod matcher;
+mod matches;
 mod obstacle;
 mod plan;
 mod planned;
@@ -21,11 +22,11 @@ mod search;
 mod statistics;
 mod watch;
 
-pub use environment::{CHOICE_LIMIT, SEARCH_LIMIT};
+pub use environment::{CHOICE_LIMIT, SEARCH_LIMIT, WHOLE_LIMIT};
 pub use explain::{SearchPlan, SearchStep};
 pub use matcher::Matcher;
+pub use matches::Matches;
 pub use obstacle::{End, Obstacle};
-pub use search::Matches;
 pub use watch::{MatchDelta, RuleMatch, Watch};
 
 pub(crate) use ahead::Ahead;
@@ -55,6 +56,13 @@ pub enum MatchError {
     /// nodes of a pattern. See [`CHOICE_LIMIT`] and [`SEARCH_LIMIT`].
     #[error("given up after {limit} nodes had been tried for its variables")]
     Limit {
+        /// How many.
+        limit: u64,
+    },
+    /// So many nodes were tried for all matches that no more are looked for; there may be more. See
+    /// [`Matches::within_all`].
+    #[error("stopped after {limit} nodes had been tried: there may be more matches")]
+    Whole {
         /// How many.
         limit: u64,
     },
@@ -89,6 +97,7 @@ impl From<Interrupt> for MatchError {
         match interrupt {
             Interrupt::Read(error) => Self::Read(error),
             Interrupt::Limit(limit) => Self::Limit { limit },
+            Interrupt::Whole(limit) => Self::Whole { limit },
         }
     }
 }

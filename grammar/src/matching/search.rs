@@ -3,17 +3,15 @@
 //! Guarantee: every match comes exactly once, in an order that the graph and the plan alone
 //! determine; matches are injective.
 
-use super::MatchError;
 use super::ahead::Ends;
 use super::candidates::Candidates;
 use super::environment::{Environment, Interrupt, node};
 use super::frame::Frame;
 use super::host::Host;
-use super::plan::{Plan, plan};
+use super::plan::Plan;
 use super::query::Problem;
-use super::statistics::Statistics;
 use crate::Binding;
-use dsr::{NodeId, ReadError, Snapshot};
+use dsr::NodeId;
 use std::fmt;
 use std::sync::Arc;
 
@@ -33,10 +31,10 @@ const NONE: usize = usize::MAX;
 #[derive(Debug)]
 pub(crate) struct Search<'h, H: Host> {
     host: &'h H,
-    problem: Problem,
-    plan: Arc<Plan>,
+    pub(super) problem: Problem,
+    pub(super) plan: Arc<Plan>,
     levels: Vec<Level<'h, H>>,
-    state: State,
+    pub(super) state: State,
 }
 
 /// What one step has found.
@@ -66,7 +64,7 @@ struct Level<'h, H: Host + 'h> {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum State {
+pub(super) enum State {
     Fresh,
     Running,
     Done,
@@ -117,7 +115,6 @@ impl<'h, H: Host> Search<'h, H> {
     /// is none any more.
     #[inline]
     pub(crate) fn advance(&mut self) -> Result<bool, Interrupt> {
-        self.problem.environment.renew();
         let steps = self.levels.len();
         if let Some(last) = self.levels.last_mut()
             && last.next < last.rows.len()
@@ -144,6 +141,7 @@ impl<'h, H: Host> Search<'h, H> {
     }
 
     fn try_advance(&mut self) -> Result<bool, Interrupt> {
+        self.problem.environment.renew();
         let Some(last) = self.levels.len().checked_sub(1) else {
             return Ok(self.state == State::Fresh && self.begin()?);
         };
@@ -381,7 +379,7 @@ impl<'h, H: Host> Search<'h, H> {
         (0..variables).filter_map(|slot| node(&self.problem.environment, slot))
     }
 
-    fn binding(&self) -> Binding {
+    pub(super) fn binding(&self) -> Binding {
         let variables = self.problem.query.variables.iter();
         Binding::of_distinct(variables.cloned().zip(self.nodes()))
     }
@@ -403,77 +401,5 @@ fn bind<H: Host>(
         level.bound = row;
         step.bind(level.rows[row], environment);
         row = level.parents[row];
-    }
-}
-
-/// The matches of a rule or goal, found one at a time.
-///
-/// Ends after the first error: a snapshot that became too old, or a search without end.
-pub struct Matches<'a> {
-    search: Search<'a, Snapshot>,
-}
-
-impl fmt::Debug for Matches<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Matches")
-            .field("plan", &self.search.plan)
-            .field("state", &self.search.state)
-            .finish_non_exhaustive()
-    }
-}
-
-impl<'a> Matches<'a> {
-    pub(crate) fn new(snapshot: &'a Snapshot, problem: Problem) -> Result<Self, ReadError> {
-        let statistics = Statistics::of(snapshot, &problem.query)?;
-        let plan = plan(&problem.query, &statistics, &problem.given());
-        Ok(Self::by_plan(snapshot, problem, Arc::new(plan)))
-    }
-
-    pub(crate) fn by_plan(snapshot: &'a Snapshot, problem: Problem, plan: Arc<Plan>) -> Self {
-        Self {
-            search: Search::new(snapshot, problem, plan),
-        }
-    }
-
-    /// The same, but giving up where so many nodes were tried from one match to the next, in place
-    /// of [`SEARCH_LIMIT`](crate::SEARCH_LIMIT).
-    #[must_use]
-    pub fn within(mut self, limit: u64) -> Self {
-        self.search.problem.environment.set_limit(limit);
-        self
-    }
-
-    /// Counts the matches that are left.
-    ///
-    /// # Errors
-    /// [`MatchError`], which ends the search.
-    pub fn count_all(mut self) -> Result<u64, MatchError> {
-        let mut count = 0;
-        while self.search.advance()? {
-            count += 1;
-        }
-        Ok(count)
-    }
-
-    /// Where each step of the plan finds its candidates.
-    #[cfg(test)]
-    pub(super) fn sources(&self) -> impl Iterator<Item = String> {
-        self.search
-            .plan
-            .steps
-            .iter()
-            .map(|step| format!("{:?}", step.source))
-    }
-}
-
-impl Iterator for Matches<'_> {
-    type Item = Result<Binding, MatchError>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        match self.search.advance() {
-            Ok(true) => Some(Ok(self.search.binding())),
-            Ok(false) => None,
-            Err(interrupt) => Some(Err(interrupt.into())),
-        }
     }
 }

@@ -4,7 +4,7 @@ use super::{find_rule, load, unmatched};
 use crate::commands::graph::read_graph;
 use crate::commands::output::{print, print_json};
 use crate::{Answer, Failure};
-use grammar::{Binding, Rule, SearchPlan, SearchStep};
+use grammar::{Binding, Rule, SearchPlan, SearchStep, WHOLE_LIMIT};
 use serde_json::{Value as Json, json};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -118,7 +118,12 @@ fn table(plan: &SearchPlan) -> String {
         let _ = writeln!(text, "    {}", cells.join("  ").trim_end());
     }
     if let Some(limit) = plan.given_up {
-        let tried = "nodes had been tried for one match; found is what was found until then";
+        let whole = if limit == WHOLE_LIMIT {
+            ""
+        } else {
+            " for one match"
+        };
+        let tried = format!("nodes had been tried{whole}; found is what was found until then");
         // Writing to a string does not fail.
         let _ = writeln!(text, "    given up after {limit} {tried}");
     }

@@ -5,6 +5,7 @@ mod apply;
 mod check;
 mod explain;
 mod load;
+mod matching;
 
 use super::graph::{attach, read_graph};
 use super::output::{print, print_json, tell};
@@ -19,7 +20,6 @@ use serde_json::{Map, Value as Json, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::Path;
-use std::time::Instant;
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     let json = arguments.json;
@@ -45,7 +45,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
             rule,
             world,
             count,
-        } => matches(file, rule.as_deref(), world, *count, json),
+            limit,
+        } => {
+            let listed = if *count { None } else { Some(*limit) };
+            matching::matches(file, rule.as_deref(), world, listed, json)
+        }
         RulesAction::Explain { file, rule, world } => {
             explain::explain(file, rule.as_deref(), world.as_deref(), json)
         }
@@ -413,84 +417,4 @@ fn unmatched(error: MatchError) -> Failure {
         ),
         other => Failure::internal(other),
     }
-}
-
-/// What matching a rule came to.
-struct Found {
-    count: u64,
-    matches: Vec<Binding>,
-    seconds: f64,
-}
-
-fn find(grammar: &Grammar, snapshot: &Snapshot, rule: &Rule, keep: bool) -> Result<Found, Failure> {
-    #[allow(
-        clippy::disallowed_methods,
-        reason = "the verb tells how long matching took"
-    )]
-    let started = Instant::now();
-    let search = grammar
-        .matches(snapshot, rule, &Binding::new())
-        .map_err(Failure::internal)?;
-    let (count, matches) = if keep {
-        let matches: Vec<Binding> = search.collect::<Result<_, _>>().map_err(unmatched)?;
-        (matches.len() as u64, matches)
-    } else {
-        (search.count_all().map_err(unmatched)?, Vec::new())
-    };
-    Ok(Found {
-        count,
-        matches,
-        seconds: started.elapsed().as_secs_f64(),
-    })
-}
-
-fn matches(
-    file: &Path,
-    rule: Option<&str>,
-    world: &WorldArgs,
-    only_count: bool,
-    as_json: bool,
-) -> Result<Answer, Failure> {
-    let grammar = load(file, rule)?;
-    let rules: Vec<&Rule> = match rule {
-        Some(name) => vec![find_rule(&grammar, name)?],
-        None => grammar.all_rules().collect(),
-    };
-    let snapshot = World::open(world)?.snapshot()?;
-    let mut names = Names::new(&snapshot);
-    let mut rows = Vec::new();
-    for one in rules {
-        let found = find(&grammar, &snapshot, one, !only_count)?;
-        let named = found.matches.iter().map(|binding| names.of_all(binding));
-        let named = named.collect::<Result<Vec<_>, _>>()?;
-        if as_json {
-            let mut row = json!({
-                "rule": &*one.name, "count": found.count, "seconds": found.seconds,
-            });
-            if !only_count {
-                row["matches"] = json!(named);
-            }
-            rows.push(row);
-            continue;
-        }
-        let mut text = String::new();
-        let plural = if found.count == 1 { "match" } else { "matches" };
-        let milliseconds = found.seconds * 1e3;
-        let heading = format!(
-            "{}: {} {plural} in {milliseconds:.3} ms",
-            one.name, found.count
-        );
-        // Writing to a string does not fail.
-        let _ = writeln!(text, "{heading}");
-        for named in &named {
-            let _ = writeln!(text, "    {}", words(one, named));
-        }
-        print(&text)?;
-    }
-    if as_json {
-        // Asked for one rule, the answer is of one rule.
-        let one = rule.is_some().then(|| rows.pop()).flatten();
-        print_json(&one.unwrap_or(Json::Array(rows)))?;
-    }
-    Ok(Answer::Yes)
 }

@@ -1,0 +1,136 @@
+//! The verbs of rules where there is too much of something: defects in a line, rules that conflict, matches.
+//! Each has a stated limit, and says that it was met.
+
+use crate::support::program::Program;
+use serde_json::{Value, json};
+use std::fs;
+use tempfile::TempDir;
+
+fn cortex(folder: &TempDir, arguments: &[&str]) -> (i32, String, String) {
+    let path = |word: &&str| {
+        let file = folder.path().join(word);
+        if file.exists() {
+            file.to_str().unwrap().to_owned()
+        } else {
+            (*word).to_owned()
+        }
+    };
+    let arguments: Vec<String> = arguments.iter().map(path).collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let output = Program::run(&arguments);
+    let words = |bytes| String::from_utf8(bytes).unwrap();
+    let code = output.status.code().unwrap();
+    (code, words(output.stdout), words(output.stderr))
+}
+
+fn folder(files: &[(&str, &str)]) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in files {
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    folder
+}
+
+#[test]
+fn many_defects_in_one_line_are_shown_in_part_and_listed_whole() {
+    let rule =
+        |index: usize| format!("r{index} : active(1) {{ {{ a:t x->a(l) }} => {{ a:t (p }} }} ");
+    let text = "name=x\n===\n".to_owned() + &(0..400).map(rule).collect::<String>();
+    let folder = folder(&[("rules.aggl", &text)]);
+    let (code, _, told) = cortex(&folder, &["rules", "check", "rules.aggl"]);
+    assert_eq!(code, 2);
+    assert!(told.len() < 200_000, "{} bytes", told.len());
+    assert!(told.contains(" more"), "{told}");
+    let (code, out, _) = cortex(&folder, &["rules", "check", "rules.aggl", "--json"]);
+    assert_eq!(code, 2);
+    let out: Value = serde_json::from_str(&out).unwrap();
+    assert!(out["diagnostics"].as_array().unwrap().len() >= 400);
+}
+
+#[test]
+fn conflicts_of_many_rules_have_a_limit_that_is_told() {
+    let rule = |index: usize| {
+        format!(
+            "r{index} : active(1) {{ {{ r:robot a:room b:room r->a(in) a->b(door) }} => \
+             {{ r:robot a:room b:room r->b(in) a->b(door) }} }}\n"
+        )
+    };
+    let text = "name=x\n===\n".to_owned() + &(0..100).map(rule).collect::<String>();
+    let folder = folder(&[("rules.aggl", &text)]);
+    let (code, out, _) = cortex(&folder, &["rules", "check", "rules.aggl", "--json"]);
+    let out: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(code, 0);
+    assert_eq!(
+        out["conflicts"].as_array().unwrap().len(),
+        grammar::CONFLICT_LIMIT
+    );
+    assert_eq!(
+        out["conflicts_left"],
+        json!(100 * 100 - grammar::CONFLICT_LIMIT)
+    );
+    let (code, _, told) = cortex(&folder, &["rules", "check", "rules.aggl", "--conflicts"]);
+    assert_eq!(
+        (code, told.contains("of 9000 pairs of rules")),
+        (0, true),
+        "{told}"
+    );
+}
+
+#[test]
+fn matches_without_end_are_listed_and_counted_in_part() {
+    let node =
+        |id: usize| json!({"id": id, "type": "box", "name": format!("b{id}"), "attributes": {}});
+    let nodes: Vec<Value> = (1..=300).map(node).collect();
+    let world = json!({"format": "dsr/1", "nodes": nodes, "edges": []}).to_string();
+    let rule = "name=x\n===\nwide : active(1) { { a:box b:box c:box d:box } => { a:box b:box c:box d:box } }\n\
+        pair : active(1) { { a:box b:box } => { a:box b:box } }\n";
+    let folder = folder(&[("rules.aggl", rule), ("world.json", &world)]);
+    let matched = |rest: &[&str]| {
+        let arguments = [
+            "rules",
+            "match",
+            "rules.aggl",
+            "--world",
+            "world.json",
+            "--rule",
+        ];
+        let (code, out, told) = cortex(&folder, &[&arguments[..], rest].concat());
+        assert_eq!(code, 0, "{told}");
+        out
+    };
+    let out = matched(&["wide", "--limit", "3"]);
+    assert!(out.starts_with("wide: at least "), "{out}");
+    assert!(
+        out.contains("stopped after 200000000 nodes had been tried"),
+        "{out}"
+    );
+    assert_eq!(out.lines().filter(|line| line.contains("a=")).count(), 3);
+    let out: Value = serde_json::from_str(&matched(&["wide", "--count", "--json"])).unwrap();
+    assert_eq!(out["complete"], json!(false));
+    assert!(out["count"].as_u64().unwrap() > 100_000_000);
+    let out: Value = serde_json::from_str(&matched(&["pair", "--limit", "5", "--json"])).unwrap();
+    assert_eq!(
+        (&out["complete"], &out["count"]),
+        (&json!(true), &json!(300 * 299))
+    );
+    assert_eq!(out["matches"].as_array().unwrap().len(), 5);
+    let out = matched(&["pair", "--limit", "5"]);
+    assert!(
+        out.ends_with("and 89695 more (--limit N lists N)\n"),
+        "{out}"
+    );
+    let arguments = [
+        "rules",
+        "explain",
+        "rules.aggl",
+        "--world",
+        "world.json",
+        "--rule",
+        "wide",
+    ];
+    let (_, out, _) = cortex(&folder, &arguments);
+    assert!(
+        out.contains("given up after 200000000 nodes had been tried;"),
+        "{out}"
+    );
+}
