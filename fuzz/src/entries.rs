@@ -195,35 +195,70 @@ pub fn schema(bytes: &[u8]) {
     drop(Schema::from_toml("schema.toml", &text(bytes)));
 }
 
-/// A grammar: parsed, checked, printed, and its rules matched and applied.
+/// A grammar: parsed, checked, its defects shown, its rules compared, printed, matched, explained and applied,
+/// those beside broken ones, too. Each is bounded, so that a slow or a large answer is found as such.
 pub fn grammar(bytes: &[u8]) {
     let (grammar, diagnostics) = grammar::parse_grammar(&text(bytes), "rules.aggl");
     for diagnostic in &diagnostics {
         assert!(diagnostic.line_and_column().0 > 0, "lines count from 1");
     }
-    drop(grammar.analyse(None));
-    if grammar::has_errors(&diagnostics) {
-        return;
-    }
-    let (_, again) = grammar::parse_grammar(&grammar.to_string(), "rules.aggl");
-    assert!(
-        !grammar::has_errors(&again),
-        "what was printed cannot be read"
-    );
-    let snapshot = left_sides(&grammar).snapshot();
-    for rule in grammar.all_rules().take(20) {
-        let Ok(matches) = grammar.matches(&snapshot, rule, &grammar::Binding::new()) else {
-            continue;
-        };
-        let mut matches = matches.within(50_000).take(100);
-        if let Some(Ok(binding)) = matches.next() {
-            drop(grammar.apply(&snapshot, &rule.name, &binding));
+    let broken = grammar::has_errors(&diagnostics);
+    let sound = if broken {
+        grammar.sound(&diagnostics).ok()
+    } else {
+        None
+    };
+    let sound = sound.map(|sound| sound.grammar);
+    show(diagnostics);
+    show(grammar.analyse(None));
+    for grammar in sound.iter().chain([&grammar]) {
+        let conflicts = grammar.conflicts();
+        assert!(conflicts.found.len() <= grammar::CONFLICT_LIMIT);
+        let conflicts = conflicts.found.into_iter();
+        show(conflicts.map(|conflict| conflict.diagnostic).collect());
+        let snapshot = left_sides(grammar).snapshot();
+        for rule in grammar.all_rules().take(20) {
+            match_and_apply(grammar, rule, &snapshot);
         }
-        matches.for_each(drop);
+    }
+    if !broken {
+        let (_, again) = grammar::parse_grammar(&grammar.to_string(), "rules.aggl");
+        assert!(
+            !grammar::has_errors(&again),
+            "what was printed cannot be read"
+        );
     }
 }
 
-/// A graph in which each rule's left side is once, as far as a graph can have it.
+/// Shows what is wrong as the program does.
+fn show(diagnostics: Vec<grammar::Diagnostic>) {
+    let all = diagnostics.len();
+    let defects = grammar::Defects { diagnostics };
+    let words = defects.to_string().len();
+    let shown = defects.report();
+    // An excerpt of each, and each one's words up to three times.
+    let most = 4_000 * all.min(grammar::SHOWN_LIMIT) + 4 * words + 1_000;
+    assert!(shown.len() < most, "{} bytes of {all} defects", shown.len());
+}
+
+fn match_and_apply(grammar: &grammar::Grammar, rule: &grammar::Rule, snapshot: &Snapshot) {
+    let nothing = grammar::Binding::new();
+    drop(grammar.search_plan_within(Some(snapshot), rule, &nothing, 50_000));
+    let Ok(matches) = grammar.matches(snapshot, rule, &nothing) else {
+        return;
+    };
+    let mut matches = matches.within(50_000).within_all(100_000);
+    for binding in matches.by_ref().take(3).flatten() {
+        drop(grammar.apply(snapshot, &rule.name, &binding));
+        drop(grammar.obstacle(snapshot, rule, &binding));
+    }
+    if let Ok((count, complete)) = matches.count_rest() {
+        assert!(complete || count <= 100_000);
+    }
+}
+
+/// A graph in which each rule's left side is once, as far as a graph can have it, and many nodes of the types
+/// in it.
 fn left_sides(grammar: &grammar::Grammar) -> Graph {
     let mut graph = Graph::in_memory(Schema::open());
     for (index, rule) in grammar.rules.iter().enumerate().take(20) {
@@ -236,6 +271,17 @@ fn left_sides(grammar: &grammar::Grammar) -> Graph {
             transaction.create_edge(name(&edge.from), &edge.label, name(&edge.to));
         }
         drop(graph.commit(&transaction, "fuzz", Time::default()));
+        let mut crowd = Transaction::new();
+        for node in rule.bound_nodes().take(3) {
+            for one in 0..20 {
+                crowd.create_node(
+                    &node.type_name,
+                    &format!("{one} more of {index}{}", node.variable),
+                    vec![],
+                );
+            }
+        }
+        drop(graph.commit(&crowd, "fuzz", Time::default()));
     }
     graph
 }

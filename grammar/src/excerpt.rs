@@ -3,8 +3,11 @@
 //! Guarantee: it is at most a few lines, and of lines that are very long only what is near the
 //! defect; so that many defects in a long line do not show that line as many times.
 
-use crate::{SourceFile, Span};
-use miette::{MietteError, MietteSpanContents, SourceCode, SourceSpan, SpanContents};
+use crate::{Defects, SourceFile, Span};
+use miette::{
+    GraphicalReportHandler, GraphicalTheme, MietteError, MietteSpanContents, SourceCode,
+    SourceSpan, SpanContents,
+};
 
 /// So many bytes are underlined at most.
 const UNDERLINED: usize = 160;
@@ -75,6 +78,17 @@ impl SourceFile {
     }
 }
 
+impl Defects {
+    /// The whole report as it is shown in a terminal, without colours.
+    pub fn report(&self) -> String {
+        let handler = GraphicalReportHandler::new_themed(GraphicalTheme::unicode_nocolor());
+        let mut text = String::new();
+        // Writing to a string does not fail, and every place lies in its file.
+        let _ = handler.render_report(&mut text, self);
+        text
+    }
+}
+
 impl SourceCode for SourceFile {
     fn read_span<'a>(
         &'a self,
@@ -107,14 +121,6 @@ impl SourceCode for SourceFile {
 mod tests {
     use crate::{Defects, SHOWN_LIMIT, parse_grammar};
     use expect_test::expect;
-    use miette::{GraphicalReportHandler, GraphicalTheme};
-
-    fn rendered(defects: &Defects) -> String {
-        let handler = GraphicalReportHandler::new_themed(GraphicalTheme::unicode_nocolor());
-        let mut text = String::new();
-        handler.render_report(&mut text, defects).unwrap();
-        text
-    }
 
     fn defects(text: &str) -> Defects {
         let (_, diagnostics) = parse_grammar(text, "long.aggl");
@@ -128,7 +134,7 @@ mod tests {
         };
         let good: String = (0..50).map(|index| rule(index, "b")).collect();
         let text = format!("name=x\n===\n{good}{}{good}\n", rule(99, "señal"));
-        let rendered = rendered(&defects(&text));
+        let rendered = defects(&text).report();
         let near = rendered
             .lines()
             .skip_while(|line| !line.contains("[long.aggl:3:"));
@@ -136,11 +142,11 @@ mod tests {
             .map(|line| format!("|{}", line.trim_end()))
             .take(4)
             .collect();
-        expect![[r#"
+        expect![[r"
             |   ╭─[long.aggl:3:2772]
             | 3 │ active(1) { { a:t b:t a->b(l) } => { a:t b:t } } r99 : active(1) { { a:t b:t a->señal(l) } => { a:t b:t } } r0 : active(1) { { a:t b:t a->b(l) } => { a:t b:t } } r1
             |   ·                                                                                 ──┬──
-            |   ·                                                                                   ╰── here"#]]
+            |   ·                                                                                   ╰── here"]]
         .assert_eq(&near.join("\n"));
     }
 
@@ -156,7 +162,7 @@ mod tests {
             assert!(all > 2_000);
             let more = format!("and {} more", all - SHOWN_LIMIT);
             assert!(defects.to_string().ends_with(&more));
-            let rendered = rendered(&defects);
+            let rendered = defects.report();
             assert!(rendered.contains(&more));
             assert!(rendered.len() < 200_000, "{}", rendered.len());
         }

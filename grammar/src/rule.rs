@@ -221,6 +221,7 @@ impl Comparison {
     }
 
     /// The comparison that holds of two values with an order where this one does not.
+    #[must_use]
     pub const fn negated(self) -> Self {
         match self {
             Self::Equal => Self::NotEqual,

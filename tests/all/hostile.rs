@@ -239,6 +239,16 @@ fn grammars_and_goals() {
         entries::grammar,
         &shipped("scenarios/care-centre/rules.aggl"),
     );
+    // Rules with nothing to join their nodes, rules that conflict with each other, all in one line.
+    let rule = |index: usize| {
+        format!(
+            "r{index} : active(1) {{ {{ a:t b:t c:t d:u x->b(l) }} => {{ a:t b:t c:t a->b(m) }} \
+             precondition {{ (forall e:t f:u (or (l e f) (not (m f a)))) }} }} \
+             s{index} : active(1) {{ {{ a:t b:t c:t d:u }} => {{ a:t b:t a->b(l) }} }} "
+        )
+    };
+    let wide = "name=x\n===\n".to_owned() + &(0..3).map(rule).collect::<String>();
+    withstands(entries::grammar, wide.as_bytes());
     let goal =
         b"{ \"robot\":robot r:room \"robot\"->r(in) }\nprecondition { (not \"robot\"->r(at)) }";
     withstands(entries::goal, goal);

@@ -1,7 +1,7 @@
 //! The verbs of rules where there is too much of something: defects in a line, rules that conflict, matches.
 //! Each has a stated limit, and says that it was met.
 
-use crate::support::program::Program;
+use crate::support::Program;
 use serde_json::{Value, json};
 use std::fs;
 use tempfile::TempDir;

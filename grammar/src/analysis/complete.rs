@@ -232,41 +232,61 @@ impl<'t> Ways<'t> {
             }
             (Condition::Exists { variables, body }, true)
             | (Condition::Forall { variables, body }, false) => {
-                let mut found = Vec::new();
-                for (draft, chosen) in self.chosen(draft, places, variables, true) {
-                    for draft in self.to(draft, &chosen, body, holds) {
-                        found.push(draft.clone());
-                        // By these nodes alone: so that without them it comes out the other way.
-                        let mut only = vec![draft.clone()];
-                        for (_, other) in self.chosen(draft, places, variables, false) {
-                            if other != chosen {
-                                let more = only.into_iter();
-                                let more = more.flat_map(|d| self.to(d, &other, body, !holds));
-                                only = more.take(WAYS).collect();
-                            }
-                        }
-                        found.extend(only);
-                    }
-                }
-                found
+                self.by_some(draft, places, (variables, body), holds)
             }
-            // It may hold as it is, by all nodes that are there, and so that it hinges on some of them.
             (Condition::Exists { variables, body }, false)
             | (Condition::Forall { variables, body }, true) => {
-                let mut found = vec![draft.clone()];
-                let mut by_all = vec![draft.clone()];
-                for (_, places) in self.chosen(draft.clone(), places, variables, false) {
-                    let more = by_all.into_iter();
-                    let more = more.flat_map(|draft| self.to(draft, &places, body, holds));
-                    by_all = more.take(WAYS).collect();
-                }
-                found.extend(by_all);
-                for (draft, places) in self.chosen(draft, places, variables, true) {
-                    found.extend(self.to(draft, &places, body, holds));
-                }
-                found
+                self.by_each(draft, places, (variables, body), holds)
             }
         }
+    }
+
+    /// A formula holds for some nodes; and for these alone, so that without them it comes out the other way.
+    fn by_some(
+        &self,
+        draft: Draft,
+        places: &Places,
+        (variables, body): (&[PatternNode], &Condition),
+        holds: bool,
+    ) -> Vec<Draft> {
+        let mut found = Vec::new();
+        for (draft, chosen) in self.chosen(draft, places, variables, true) {
+            for draft in self.to(draft, &chosen, body, holds) {
+                found.push(draft.clone());
+                let mut only = vec![draft.clone()];
+                for (_, other) in self.chosen(draft, places, variables, false) {
+                    if other != chosen {
+                        let more = only.into_iter();
+                        let more = more.flat_map(|d| self.to(d, &other, body, !holds));
+                        only = more.take(WAYS).collect();
+                    }
+                }
+                found.extend(only);
+            }
+        }
+        found
+    }
+
+    /// A formula holds for all nodes: as it is, by all that are there, and so that it hinges on some of them.
+    fn by_each(
+        &self,
+        draft: Draft,
+        places: &Places,
+        (variables, body): (&[PatternNode], &Condition),
+        holds: bool,
+    ) -> Vec<Draft> {
+        let mut found = vec![draft.clone()];
+        let mut by_all = vec![draft.clone()];
+        for (_, places) in self.chosen(draft.clone(), places, variables, false) {
+            let more = by_all.into_iter();
+            let more = more.flat_map(|draft| self.to(draft, &places, body, holds));
+            by_all = more.take(WAYS).collect();
+        }
+        found.extend(by_all);
+        for (draft, places) in self.chosen(draft, places, variables, true) {
+            found.extend(self.to(draft, &places, body, holds));
+        }
+        found
     }
 
     fn every<'c>(

@@ -24,7 +24,7 @@ impl<'g> Kinds<'g> {
         let declarations = &grammar.types.declarations;
         let declared = declarations.iter().flat_map(|d| &d.names);
         let parents = declarations.iter().flat_map(|d| &d.parents);
-        let written = declared.chain(parents).map(|name| name.as_str());
+        let written = declared.chain(parents).map(crate::Name::as_str);
         for name in written.chain(used) {
             numbers.entry(name).or_insert_with(|| {
                 names.push(name);

@@ -293,13 +293,14 @@ fn many_rules_are_compared_by_what_they_have_in_common() {
 #[test]
 fn what_is_too_much_to_compare_is_counted() {
     // Everything can be laid over everything, and nothing is disabled; so that all is tried.
-    let nodes: String = (0..9).map(|index| format!("n{index}:t ")).collect();
-    let links: String = (1..9).map(|index| format!("n0->n{index}(l) ")).collect();
+    let words = |word: fn(usize) -> String| (1..9).map(word).collect::<Vec<_>>().join(" ");
+    let nodes = words(|index| format!("n{index}:t"));
+    let links = words(|index| format!("n1->n{index}(l)"));
     let rule = |index: usize| {
         format!(
             "r{index} : active(1) {{ {{ {nodes} {links} }} => {{ {nodes} {links} }}\n\
              precondition {{ (forall a:t b:t c:t d:t (when (and (l a b) (l c d)) (> a.n b.n))) }}\n\
-             effect {{ (assign n0.n 1) }} }}\n"
+             effect {{ (assign n1.n 1) }} }}\n"
         )
     };
     let text = "name=x\n===\n".to_owned() + &(0..20).map(rule).collect::<String>();
