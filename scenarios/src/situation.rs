@@ -5,7 +5,9 @@
 use crate::metrics::mapped;
 use crate::scenario::Scenario;
 use crate::scenes::Frame;
-use agents::social_mapping::scene::{Activity, BODY_RADIUS, Manner, Person, Rejection, SceneError};
+use agents::social_mapping::scene::{
+    Activity, BODY_RADIUS, Manner, Person, Rejection, SceneError, is_pose,
+};
 use agents::social_mapping::{ConfigError, SocialConfig, SocialMapper, SocialScene, Update};
 use dsr::Time;
 use nalgebra::{Isometry2, Point2, Vector2};
@@ -47,7 +49,9 @@ impl Situation {
     /// A frame of a recording, on an open floor around its people. Features that `config` does not
     /// know are left out.
     pub fn of_frame(name: &str, frame: &Frame, config: &SocialConfig) -> Self {
-        let places = || frame.people.iter().map(|one| one.pose.translation.vector);
+        // Whoever is nowhere is left out by the map, which says so.
+        let placed = || frame.people.iter().filter(|one| is_pose(&one.pose));
+        let places = || placed().map(|one| one.pose.translation.vector);
         let low = places().reduce(|a, b| a.inf(&b)).unwrap_or_default();
         let high = places().reduce(|a, b| a.sup(&b)).unwrap_or_default();
         let margin = Vector2::repeat(AROUND);

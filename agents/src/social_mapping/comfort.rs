@@ -5,7 +5,7 @@
 
 use super::gaussian::AsymmetricGaussian;
 use super::groups::{Grouping, TooCrowded};
-use super::scene::Wall;
+use super::scene::{FARTHEST, Wall, is_place, is_pose};
 use super::stamps::distance_to_segment;
 use nalgebra::{Isometry2, Point2};
 use serde::{Deserialize, Serialize};
@@ -27,24 +27,30 @@ pub struct ComfortScene {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ComfortError {
     /// The place itself is nowhere.
-    #[error("the place is not finite")]
+    #[error("the place is not within {FARTHEST:e} m")]
     Place,
     /// Somebody is nowhere.
-    #[error("the pose of person {index} is not finite")]
+    #[error("the pose of person {index} is no place within {FARTHEST:e} m")]
     Person {
         /// Index among the people.
         index: usize,
     },
     /// Somebody attends to nowhere.
-    #[error("link {index} has an end that is not finite")]
+    #[error("link {index} has an end that is no place within {FARTHEST:e} m")]
     Link {
         /// Index among the links.
         index: usize,
     },
     /// A wall is nowhere.
-    #[error("wall {index} has an end that is not finite")]
+    #[error("wall {index} has an end that is no place within {FARTHEST:e} m")]
     Wall {
         /// Index among the walls.
+        index: usize,
+    },
+    /// A corner of the room is nowhere.
+    #[error("corner {index} of the room is no place within {FARTHEST:e} m")]
+    Corner {
+        /// Index among the corners.
         index: usize,
     },
     /// Nothing fits into the room.
@@ -133,17 +139,13 @@ impl Comfort {
 
 impl ComfortScene {
     fn check(&self, place: Point2<f64>) -> Result<(), ComfortError> {
-        let finite = |point: &Point2<f64>| point.iter().all(|x| x.is_finite());
-        if !finite(&place) {
+        if !is_place(&place) {
             return Err(ComfortError::Place);
         }
-        let is_pose = |pose: &Isometry2<f64>| {
-            finite(&pose.translation.vector.into()) && pose.rotation.angle().is_finite()
-        };
         if let Some(index) = self.people.iter().position(|pose| !is_pose(pose)) {
             return Err(ComfortError::Person { index });
         }
-        let broken = |walls: &[Wall]| walls.iter().position(|ends| !ends.iter().all(finite));
+        let broken = |walls: &[Wall]| walls.iter().position(|ends| !ends.iter().all(is_place));
         if let Some(index) = broken(&self.links) {
             return Err(ComfortError::Link { index });
         }
@@ -151,18 +153,29 @@ impl ComfortScene {
             return Err(ComfortError::Wall { index });
         }
         let corners = self.room.len();
-        let area = area(&self.room);
-        if corners > 0 && !(area.is_finite() && area > 0.0) {
+        if let Some(index) = self.room.iter().position(|corner| !is_place(corner)) {
+            return Err(ComfortError::Corner { index });
+        }
+        if corners > 0 && area(&self.room) < LEAST_AREA {
             return Err(ComfortError::Room { corners });
         }
         Ok(())
     }
 }
 
-/// What a closed outline encloses, m^2 (shoelace); NaN where a corner is.
+/// A room smaller than this is none, m^2: corners in one line enclose as much by rounding.
+const LEAST_AREA: f64 = 1e-6;
+
+/// What a closed outline encloses, m^2 (shoelace).
 fn area(outline: &[Point2<f64>]) -> f64 {
-    let pairs = outline.iter().zip(outline.iter().cycle().skip(1));
-    let twice: f64 = pairs.map(|(a, b)| a.x * b.y - b.x * a.y).sum();
+    let Some(first) = outline.first() else {
+        return 0.0;
+    };
+    // From the first corner, so that squares of large coordinates do not swallow a small room.
+    let pairs = outline
+        .windows(2)
+        .map(|pair| (pair[0] - first, pair[1] - first));
+    let twice: f64 = pairs.map(|(a, b)| a.perp(&b)).sum();
     (twice / 2.0).abs()
 }
 
@@ -262,22 +275,41 @@ mod tests {
                 .to_string()
         };
         let empty = ComfortScene::default;
-        assert_eq!(refused(empty(), f64::NAN), "the place is not finite");
+        assert_eq!(refused(empty(), f64::NAN), "the place is not within 1e8 m");
         let nowhere = ComfortScene {
             people: vec![at(0.0, 0.0, 0.0), at(0.0, f64::INFINITY, 0.0)],
             ..empty()
         };
-        assert_eq!(refused(nowhere, 0.0), "the pose of person 1 is not finite");
+        assert_eq!(
+            refused(nowhere, 0.0),
+            "the pose of person 1 is no place within 1e8 m"
+        );
         let flat = ComfortScene {
             room: [0.0, 1.0, 2.0].map(|x| Point2::new(x, x)).to_vec(),
             ..empty()
         };
         assert_eq!(refused(flat, 0.0), "the room of 3 corners encloses nothing");
+        let line = ComfortScene {
+            room: [0.1, 0.2, 0.7].map(|x| Point2::new(x, 3.0 * x)).to_vec(),
+            ..empty()
+        };
+        assert_eq!(refused(line, 0.0), "the room of 3 corners encloses nothing");
+        let torn = ComfortScene {
+            room: [0.0, 1.0, 1e200].map(|x| Point2::new(x, x * x)).to_vec(),
+            ..empty()
+        };
+        assert_eq!(
+            refused(torn, 0.0),
+            "corner 2 of the room is no place within 1e8 m"
+        );
         let open = ComfortScene {
             links: vec![[Point2::origin(), Point2::new(f64::NAN, 0.0)]],
             ..empty()
         };
-        assert_eq!(refused(open, 0.0), "link 0 has an end that is not finite");
+        assert_eq!(
+            refused(open, 0.0),
+            "link 0 has an end that is no place within 1e8 m"
+        );
     }
 
     proptest! {

@@ -139,7 +139,7 @@ impl SocialConfig {
             (
                 "proxemics.shape".to_owned(),
                 self.proxemics.shape.is_valid(),
-                "needs three finite widths greater than 0",
+                "needs three widths from 0.001 m to 1000 m",
             ),
             (
                 "proxemics.levels".to_owned(),
@@ -178,7 +178,7 @@ impl SocialConfig {
             (format!("spaces.{class}"), space.is_valid(), requirement)
         }));
         checks.extend(self.activities.iter().map(|(name, shape)| {
-            let requirement = "needs four finite widths greater than 0";
+            let requirement = "needs four widths from 0.001 m to 1000 m";
             (format!("activities.{name}"), shape.is_valid(), requirement)
         }));
         checks.extend(self.activity_in.iter().map(|(room, activity)| {

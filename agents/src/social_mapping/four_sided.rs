@@ -14,6 +14,10 @@ pub const LOOK_AHEAD: f64 = 0.5;
 /// Speeds above this stretch a space no further, m/s: faster "people" are tracking errors.
 pub const FASTEST: f64 = 2.0;
 
+/// The widths that a space may be given, metres: a millimetre to a kilometre, so that squares and quotients of
+/// them are numbers.
+pub const WIDTHS: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
+
 /// The standard deviations of a space ahead, to the left, behind and to the right, metres.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -70,9 +74,9 @@ impl FourSided {
         }
     }
 
-    /// Whether all four widths are positive and finite.
+    /// Whether all four are [`WIDTHS`].
     pub fn is_valid(&self) -> bool {
-        self.sides().iter().all(|s| s.is_finite() && *s > 0.0)
+        self.sides().iter().all(|side| WIDTHS.contains(side))
     }
 
     /// Front, left, rear, right: counter-clockwise.

@@ -2,7 +2,7 @@
 //! items 1 and 2). This file owns the curve and its contours; both are exact, in the person's own
 //! frame, so the surface is continuous everywhere.
 
-use super::four_sided::FourSided;
+use super::four_sided::{FourSided, WIDTHS};
 use nalgebra::{Isometry2, Point2};
 use serde::{Deserialize, Serialize};
 
@@ -84,7 +84,7 @@ impl AsymmetricGaussian {
     pub fn is_valid(&self) -> bool {
         [self.front, self.side, self.rear]
             .iter()
-            .all(|s| s.is_finite() && *s > 0.0)
+            .all(|side| WIDTHS.contains(side))
     }
 
     /// With a width for each of the four sides.

@@ -21,6 +21,7 @@ pub use triangulation::Triangulation;
 
 use self::near::Near;
 use nalgebra::{Isometry2, Point2};
+use super::scene::is_pose;
 use serde::{Deserialize, Serialize};
 
 /// Where more pairs of people than this stand within some [`NEARBY`] metres of each other, groups are
@@ -105,16 +106,13 @@ impl Grouping {
     }
 
     /// The groups among people at these poses (`world_from_person`), as indices in ascending order,
-    /// the groups in the order of their first members. Whose pose is not finite is in no group.
+    /// the groups in the order of their first members. Whose pose is no place, as [`is_pose`] says, is in no group
+    /// and changes nobody else's.
     ///
     /// # Errors
     /// [`TooCrowded`].
     pub fn groups(&self, people: &[Isometry2<f64>]) -> Result<Vec<Vec<usize>>, TooCrowded> {
-        let finite = |pose: &Isometry2<f64>| {
-            pose.translation.vector.iter().all(|x| x.is_finite())
-                && pose.rotation.angle().is_finite()
-        };
-        let sound: Vec<usize> = (0..people.len()).filter(|i| finite(&people[*i])).collect();
+        let sound: Vec<usize> = (0..people.len()).filter(|i| is_pose(&people[*i])).collect();
         let poses: Vec<Isometry2<f64>> = sound.iter().map(|i| people[*i]).collect();
         let places: Vec<Point2<f64>> = poses
             .iter()

@@ -13,6 +13,11 @@ use std::collections::BTreeMap;
 /// A wall from one point to another, world frame, metres.
 pub type Wall = [Point2<f64>; 2];
 
+/// What is further than this from the origin of its frame along an axis is no place, metres: more than twice
+/// round the Earth. Up to here, places are known to a ten-millionth of a metre; far beyond, neither the meshes of
+/// neighbours nor squares of distances mean anything any more.
+pub const FARTHEST: f64 = 1e8;
+
 /// The radius taken for a person whose own is unusable, metres.
 pub const BODY_RADIUS: f64 = 0.25;
 
@@ -94,8 +99,10 @@ pub struct Activity {
 /// Why no map can be made of a scene.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SceneError {
-    /// The bounds are not finite or enclose nothing.
-    #[error("the map's bounds {bounds:?} enclose nothing; need xmin < xmax and ymin < ymax")]
+    /// The bounds enclose nothing, or are no places.
+    #[error(
+        "the map's bounds {bounds:?} enclose nothing; need xmin < xmax and ymin < ymax within {FARTHEST:e} m"
+    )]
     Bounds {
         /// As given.
         bounds: [f64; 4],
@@ -111,7 +118,7 @@ pub enum SceneError {
         resolution: f64,
     },
     /// A wall has an end that is no place: leaving it out would open the map.
-    #[error("wall {index} has an end that is not finite")]
+    #[error("wall {index} has an end that is no place within {FARTHEST:e} m")]
     Wall {
         /// Its index in `walls`.
         index: usize,
@@ -131,7 +138,7 @@ pub const MOST_CELLS: f64 = 25e6;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Rejection {
     /// The person is left out.
-    #[error("person {name} is ignored: the pose is not finite")]
+    #[error("person {name} is ignored: the pose is no place within {FARTHEST:e} m")]
     PersonPose {
         /// The person.
         name: String,
@@ -151,7 +158,9 @@ pub enum Rejection {
         radius: f64,
     },
     /// The object is left out.
-    #[error("object {name} is ignored: its pose or size is not finite")]
+    #[error(
+        "object {name} is ignored: its pose is no place within {FARTHEST:e} m, or its size no length"
+    )]
     Object {
         /// The object.
         name: String,
@@ -232,7 +241,7 @@ impl SocialScene {
     pub(super) fn check(&self, resolution: f64) -> Result<(), SceneError> {
         let bounds = self.bounds;
         let [xmin, ymin, xmax, ymax] = bounds;
-        if !bounds.iter().all(|b| b.is_finite()) || xmin >= xmax || ymin >= ymax {
+        if !bounds.iter().all(|b| b.abs() <= FARTHEST) || xmin >= xmax || ymin >= ymax {
             return Err(SceneError::Bounds { bounds });
         }
         if ((xmax - xmin) / resolution).ceil() * ((ymax - ymin) / resolution).ceil() > MOST_CELLS {
@@ -246,7 +255,7 @@ impl SocialScene {
         match self
             .walls
             .iter()
-            .position(|wall| !wall.iter().all(is_finite))
+            .position(|wall| !wall.iter().all(is_place))
         {
             Some(index) => Err(SceneError::Wall { index }),
             None => Ok(()),
@@ -318,10 +327,12 @@ impl SocialScene {
     }
 }
 
-fn is_finite(point: &Point2<f64>) -> bool {
-    point.x.is_finite() && point.y.is_finite()
+/// Whether a point is a place: finite, and at most [`FARTHEST`] along either axis.
+pub fn is_place(point: &Point2<f64>) -> bool {
+    point.x.abs() <= FARTHEST && point.y.abs() <= FARTHEST
 }
 
-fn is_pose(pose: &Isometry2<f64>) -> bool {
-    is_finite(&pose.translation.vector.into()) && pose.rotation.angle().is_finite()
+/// Whether somebody or something can be at this pose: a place, and a heading.
+pub fn is_pose(pose: &Isometry2<f64>) -> bool {
+    is_place(&pose.translation.vector.into()) && pose.rotation.angle().is_finite()
 }

@@ -5,8 +5,9 @@ use crate::commands::output::print;
 use crate::{Answer, Failure};
 use agents::social_mapping::groups::score::{self, Score, TOLERANCES, score};
 use agents::social_mapping::groups::{Grouping, Method};
+use agents::social_mapping::scene::{FARTHEST, is_pose};
 use nalgebra::Isometry2;
-use scenarios::scenes::{Recording, parse_recording};
+use scenarios::scenes::{Frame, Recording, parse_recording};
 use serde_json::json;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -21,16 +22,30 @@ pub(super) fn run(file: &Path, method: Method, json: bool) -> Result<Answer, Fai
     let scores = scores(&recording, &found);
     let mut text = String::new();
     for (frame, groups) in recording.frames.iter().zip(&found) {
+        let left_out = left_out(frame);
         // Writing to a string does not fail.
         let _ = if json {
-            writeln!(text, "{}", json!({"t": frame.time, "groups": groups}))
+            let mut line = json!({"t": frame.time, "groups": groups});
+            if !left_out.is_empty() {
+                line["left_out"] = json!(left_out);
+            }
+            writeln!(text, "{line}")
         } else {
             let one = |group: &BTreeSet<u64>| {
                 let names: Vec<String> = group.iter().map(u64::to_string).collect();
                 format!("{{{}}}", names.join(" "))
             };
             let groups: Vec<String> = groups.iter().map(one).collect();
-            writeln!(text, "{:10}  {}", frame.time, groups.join(" "))
+            let mut line = groups.join(" ");
+            if !left_out.is_empty() {
+                let names: Vec<String> = left_out.iter().map(u64::to_string).collect();
+                let names = names.join(" ");
+                let _ = write!(
+                    line,
+                    "  left out, at no place within {FARTHEST:e} m: {names}"
+                );
+            }
+            writeln!(text, "{:10}  {line}", frame.time)
         };
     }
     if let Some([loose, strict]) = scores {
@@ -61,6 +76,12 @@ pub(super) fn run(file: &Path, method: Method, json: bool) -> Result<Answer, Fai
     }
     print(&text)?;
     Ok(Answer::Yes)
+}
+
+/// Whose pose is no place, by name: they are in no group.
+fn left_out(frame: &Frame) -> Vec<u64> {
+    let nowhere = frame.people.iter().filter(|one| !is_pose(&one.pose));
+    nowhere.map(|one| one.id).collect()
 }
 
 /// The groups of every frame, by name.

@@ -87,7 +87,8 @@ pub fn scene(snapshot: &Snapshot, config: &SocialConfig) -> Result<SocialScene, 
             name: node.name()?,
             class: node.type_name().to_owned(),
             world_from_object,
-            outline: if round {
+            // Of a number and none, the greater is no diameter: such a size stays none.
+            outline: if round && !size.iter().any(|side| side.is_nan()) {
                 Outline::Circle(size.max() / 2.0)
             } else {
                 Outline::Rectangle(size)

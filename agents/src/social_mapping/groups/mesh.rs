@@ -2,7 +2,9 @@
 //! that the mesh depends on the places alone: people on one spot are its one vertex.
 
 use nalgebra::Point2;
-use spade::{DelaunayTriangulation, HasPosition, Triangulation as _, mitigate_underflow};
+use spade::{
+    DelaunayTriangulation, HasPosition, Triangulation as _, mitigate_underflow, validate_coordinate,
+};
 use std::collections::BTreeMap;
 
 /// The mesh, in indices of the places given.
@@ -10,6 +12,8 @@ use std::collections::BTreeMap;
 pub(super) struct Mesh {
     /// Pairs of neighbours, the smaller index first, in order. People on one spot are neighbours.
     pub(super) edges: Vec<(usize, usize)>,
+    /// Who stands where somebody before them does, after the first of those on the spot.
+    pub(super) on_one_spot: Vec<(usize, usize)>,
     /// Triangles, the smallest index first, in order; each vertex stands for one person, the first
     /// of those on the spot.
     pub(super) triangles: Vec<[usize; 3]>,
@@ -29,30 +33,34 @@ impl HasPosition for Vertex {
 }
 
 impl Mesh {
-    /// The mesh of `places`, which are finite; O(n log n). Places beyond spade's range (2^201 m)
-    /// have no neighbours.
+    /// The mesh of `places`; O(n log n). A place beyond spade's range (2^201 m) is none: it has no
+    /// neighbours, and everybody else the mesh that they would have without it.
     pub(super) fn new(places: &[Point2<f64>]) -> Self {
         let mut spots: BTreeMap<[u64; 2], usize> = BTreeMap::new();
         let mut vertices = Vec::with_capacity(places.len());
-        let mut edges = Vec::new();
+        let mut on_one_spot = Vec::new();
         for (index, place) in places.iter().enumerate() {
             // Adding zero makes one zero of both.
             let key = [(place.x + 0.0).to_bits(), (place.y + 0.0).to_bits()];
             match spots.get(&key) {
-                Some(first) => edges.push((*first, index)),
+                Some(first) => on_one_spot.push((*first, index)),
                 None => {
                     spots.insert(key, index);
                     let position = mitigate_underflow(spade::Point2::new(place.x, place.y));
-                    vertices.push(Vertex { position, index });
+                    if [position.x, position.y]
+                        .into_iter()
+                        .all(|x| validate_coordinate(x).is_ok())
+                    {
+                        vertices.push(Vertex { position, index });
+                    }
                 }
             }
         }
         let Ok(mesh) = DelaunayTriangulation::<Vertex>::bulk_load_stable(vertices) else {
-            return Self {
-                edges,
-                triangles: Vec::new(),
-            };
+            // Every vertex is within its range.
+            return Self::default();
         };
+        let mut edges = on_one_spot.clone();
         edges.extend(mesh.undirected_edges().map(|edge| {
             let [a, b] = edge.vertices().map(|vertex| vertex.data().index);
             (a.min(b), a.max(b))
@@ -67,7 +75,11 @@ impl Mesh {
             })
             .collect();
         triangles.sort_unstable();
-        Self { edges, triangles }
+        Self {
+            edges,
+            on_one_spot,
+            triangles,
+        }
     }
 }
 
@@ -96,5 +108,17 @@ mod tests {
         assert_eq!(row(&[3.0, 1.0, 2.0]).edges, [(0, 2), (1, 2)]);
         assert_eq!(row(&[0.0, 1.0, -0.0]).edges, [(0, 1), (0, 2)]);
         assert_eq!(row(&[1e300, 1.0]).edges, []);
+    }
+
+    #[test]
+    fn who_is_nowhere_takes_no_neighbours_from_others() {
+        let mut places = [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0)]
+            .map(|(x, y)| Point2::new(x, y))
+            .to_vec();
+        let alone = Mesh::new(&places);
+        for far in [1e100, f64::INFINITY, f64::NAN] {
+            places.push(Point2::new(far, 0.0));
+            assert_eq!(Mesh::new(&places), alone);
+        }
     }
 }

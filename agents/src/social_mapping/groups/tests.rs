@@ -34,12 +34,40 @@ fn two_groups_and_a_passer_by_are_told_apart() {
 }
 
 #[test]
-fn whose_pose_is_no_place_is_in_no_group() {
-    let mut people = facing_centre(0.0, 0.0, 0.5, 2);
-    people.insert(0, Isometry2::new(Vector2::new(f64::NAN, 0.0), 0.0));
-    people.insert(2, Isometry2::new(Vector2::new(0.0, 0.0), f64::INFINITY));
-    for method in [Method::Facing, Method::GaussianClustering] {
-        assert_eq!(groups(method, &people), [[1, 3]]);
+fn whose_pose_is_no_place_is_in_no_group_and_takes_nobody_elses() {
+    let far = |x: f64, y: f64| Isometry2::new(Vector2::new(x, y), 0.0);
+    for nowhere in [
+        far(f64::NAN, 0.0),
+        far(0.0, f64::INFINITY),
+        far(1e100, 0.0),
+        far(0.0, -1e300),
+        far(1.1e8, 0.0),
+        Isometry2::new(Vector2::zeros(), f64::INFINITY),
+    ] {
+        let mut people = facing_centre(0.0, 0.0, 0.5, 3);
+        people.insert(1, nowhere);
+        for method in Method::ALL {
+            assert_eq!(groups(method, &people), [[0, 2, 3]], "{}", method.name());
+        }
+    }
+    // As far as there are places, there are groups.
+    let people = facing_centre(-9.9e7, 9.9e7, 0.5, 3);
+    for method in Method::ALL {
+        assert_eq!(groups(method, &people), [[0, 1, 2]], "{}", method.name());
+    }
+}
+
+#[test]
+fn who_stands_on_the_very_spot_of_another_is_in_the_same_group() {
+    let mut people = facing_centre(0.0, 0.0, 0.5, 3);
+    people.extend([people[1], people[1]]);
+    for method in Method::ALL {
+        assert_eq!(
+            groups(method, &people),
+            [[0, 1, 2, 3, 4]],
+            "{}",
+            method.name()
+        );
     }
 }
 

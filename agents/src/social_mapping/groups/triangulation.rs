@@ -50,7 +50,7 @@ impl Triangulation {
             side(0, 1).max(side(1, 2)).max(side(2, 0)) <= self.longest_side
         };
         let mesh = Mesh::new(&places);
-        let triangles: Vec<[usize; 3]> = mesh.triangles.into_iter().filter(short).collect();
+        let triangles: Vec<[usize; 3]> = mesh.triangles.iter().copied().filter(short).collect();
         let ends_in =
             |person: usize, t: &[usize; 3]| contains(t.map(|corner| places[corner]), ends[person]);
         let (main, others): (Vec<[usize; 3]>, Vec<_>) = triangles
@@ -78,6 +78,12 @@ impl Triangulation {
                 if beside.is_some_and(|m| ends_in(person, t) || ends_in(person, m)) {
                     union.join(person, base[0]);
                 }
+            }
+        }
+        // On one spot with a member is in the group: the mesh, which has one corner there, cannot tell them apart.
+        for (first, other) in mesh.on_one_spot {
+            if union.is_joined(first) {
+                union.join(first, other);
             }
         }
         union.groups()

@@ -4,6 +4,8 @@
 #[derive(Debug, Clone)]
 pub(super) struct Union {
     parents: Vec<usize>,
+    /// Of each set, at its root.
+    sizes: Vec<usize>,
 }
 
 impl Union {
@@ -11,6 +13,7 @@ impl Union {
     pub(super) fn new(count: usize) -> Self {
         Self {
             parents: (0..count).collect(),
+            sizes: vec![1; count],
         }
     }
 
@@ -25,8 +28,18 @@ impl Union {
     /// Makes one set of both.
     pub(super) fn join(&mut self, a: usize, b: usize) {
         let (a, b) = (self.root(a), self.root(b));
+        if a == b {
+            return;
+        }
         // The smaller index leads, so that the outcome does not depend on the order of joining.
         self.parents[a.max(b)] = a.min(b);
+        self.sizes[a.min(b)] += self.sizes[a.max(b)];
+    }
+
+    /// Whether somebody else is in the set of `index`.
+    pub(super) fn is_joined(&mut self, index: usize) -> bool {
+        let root = self.root(index);
+        self.sizes[root] > 1
     }
 
     /// The sets of at least two, each in order, in the order of their first members.

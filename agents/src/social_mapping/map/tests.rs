@@ -267,6 +267,7 @@ fn bad_items_are_left_out_or_mended_and_always_reported() {
             ..person("ana", pose(3.0, 5.0, 0.0))
         },
         person("bo", pose(9.0, 5.0, PI)),
+        person("voyager", pose(1e100, 5.0, 0.0)),
     ];
     scene.interactions = vec![("ana".into(), "bo".into()), ("ghost".into(), "ana".into())];
     scene.objects = vec![
@@ -293,11 +294,12 @@ fn bad_items_are_left_out_or_mended_and_always_reported() {
     let map = update(&scene);
     let reports: Vec<String> = map.rejected.iter().map(ToString::to_string).collect();
     expect_test::expect![[r"
-        person ghost is ignored: the pose is not finite
+        person ghost is ignored: the pose is no place within 1e8 m
         person ana is taken to stand still: the velocity is not finite
         person ana is given the usual radius: -1 m is none
-        object hole is ignored: its pose or size is not finite
-        object flat is ignored: its pose or size is not finite
+        person voyager is ignored: the pose is no place within 1e8 m
+        object hole is ignored: its pose is no place within 1e8 m, or its size no length
+        object flat is ignored: its pose is no place within 1e8 m, or its size no length
         an activity uses plant, which the map does not have or which has no space
         an activity uses hole, which the map does not have or which has no space
         an activity with plant is ignored: the activity ends at 1800000000.000 s, before it starts at 1800000001.000 s
@@ -327,7 +329,7 @@ fn a_scene_that_makes_no_map_is_refused_and_the_map_survives() {
         SceneError::Bounds { .. }
     ));
     assert!(matches!(
-        error(&|s| s.bounds[2] = 1e9),
+        error(&|s| s.bounds[2] = 1e7),
         SceneError::TooLarge { .. }
     ));
     assert!(matches!(
@@ -338,6 +340,16 @@ fn a_scene_that_makes_no_map_is_refused_and_the_map_survives() {
     assert!(matches!(
         error(&|s| s.walls.push(gap)),
         SceneError::Wall { index: 0 }
+    ));
+    // Its distance from any place would be no number, and a map without it open.
+    let endless = wall((0.0, 0.0), (1e300, 0.0));
+    assert!(matches!(
+        error(&|s| s.walls.push(endless)),
+        SceneError::Wall { index: 0 }
+    ));
+    assert!(matches!(
+        error(&|s| s.bounds = [1e17, 0.0, 1.000_000_000_000_001e17, 10.0]),
+        SceneError::Bounds { .. }
     ));
     assert!(mapper.update(noon(), &good).unwrap().dirty.is_empty());
 }
