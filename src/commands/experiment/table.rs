@@ -212,7 +212,9 @@ impl Table {
             let _ = writeln!(text, "{}", whole.trim_end());
             let note = index.checked_sub(1).and_then(|row| self.rows[row].note);
             if let Some(note) = note {
-                let _ = writeln!(text, "{:width$}  ^ {note}", "", width = widths[0]);
+                let indent = " ".repeat(widths[0]);
+                let note = note.replace('\n', &format!("\n{indent}    "));
+                let _ = writeln!(text, "{indent}  ^ {note}");
             }
         }
         for note in &self.notes {
