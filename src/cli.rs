@@ -16,7 +16,7 @@ pub(crate) use mission::{Mission, MissionAction, SubmitMission, Why};
 pub(crate) use path::{CostModel, Path, PathAlgorithm};
 pub(crate) use recording::{Record, Replay};
 pub(crate) use shell::{Completions, Man, New, NewThing};
-pub(crate) use social::{Experiment, Social, SocialAction, SocialPicture};
+pub(crate) use social::{Experiment, RosMode, Social, SocialAction, SocialPicture};
 
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;

@@ -76,6 +76,10 @@ pub(crate) enum SocialAction {
         /// How much of the map, each built on those before but for the social one
         #[arg(long, value_name = "L", default_value = Layer::default().name(), value_parser = layer())]
         layer: Layer,
+        /// How a ROS map tells costs: `scale` by greys, `raw` by the value of a pixel, `trinary` not at all
+        /// [default: scale]
+        #[arg(long, value_name = "R", value_parser = ros_mode())]
+        ros_mode: Option<RosMode>,
     },
 }
 
@@ -113,10 +117,43 @@ pub(crate) struct Experiment {
     pub(crate) json: bool,
 }
 
+/// How a map server reads the image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum RosMode {
+    /// Free or occupied, and nothing between.
+    Trinary,
+    /// White is free, black occupied, and grey between tells the cost.
+    #[default]
+    Scale,
+    /// The value of a pixel is the occupancy, 0 to 100.
+    Raw,
+}
+
+impl RosMode {
+    /// All modes.
+    pub(crate) const ALL: [Self; 3] = [Self::Trinary, Self::Scale, Self::Raw];
+
+    /// Its name, on the command line and in ROS.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Trinary => "trinary",
+            Self::Scale => "scale",
+            Self::Raw => "raw",
+        }
+    }
+}
+
 fn layer() -> impl TypedValueParser<Value = Layer> {
     PossibleValuesParser::new(Layer::ALL.map(Layer::name)).map(|name| {
         let named = |layer: &Layer| layer.name() == name;
         Layer::ALL.into_iter().find(named).unwrap_or_default()
+    })
+}
+
+fn ros_mode() -> impl TypedValueParser<Value = RosMode> {
+    PossibleValuesParser::new(RosMode::ALL.map(RosMode::name)).map(|name| {
+        let named = |mode: &RosMode| mode.name() == name;
+        RosMode::ALL.into_iter().find(named).unwrap_or_default()
     })
 }
 

@@ -4,6 +4,7 @@ mod comfort;
 mod folds;
 mod groups;
 mod picture;
+mod ros_map;
 mod schedule;
 
 use crate::cli::{Social as Arguments, SocialAction};
@@ -19,8 +20,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
             None => comfort::run(file, *json),
         },
         SocialAction::Schedule { file, instance } => schedule::run(file, instance),
-        SocialAction::Density(arguments) => picture::run(arguments, Show::Density),
-        SocialAction::Map { picture, layer } => picture::run(picture, Show::Costs(*layer)),
+        SocialAction::Density(arguments) => picture::run(arguments, Show::Density, None),
+        SocialAction::Map {
+            picture,
+            layer,
+            ros_mode,
+        } => picture::run(picture, Show::Costs(*layer), *ros_mode),
     }
 }
 

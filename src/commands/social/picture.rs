@@ -2,10 +2,10 @@
 //! programs.
 
 use super::refused;
-use crate::cli::SocialPicture as Arguments;
+use super::ros_map::DEAREST;
+use crate::cli::{RosMode, SocialPicture as Arguments};
 use crate::commands::output::print;
 use crate::{Answer, Failure};
-use agents::grid::CostGrid;
 use agents::social_mapping::SocialConfig;
 use dsr::Time;
 use scenarios::Scenario;
@@ -21,7 +21,11 @@ use std::sync::Arc;
 const SCALE: f32 = 1.5;
 const DAY: f64 = 86_400.0;
 
-pub(super) fn run(arguments: &Arguments, show: Show) -> Result<Answer, Failure> {
+pub(super) fn run(
+    arguments: &Arguments,
+    show: Show,
+    ros: Option<RosMode>,
+) -> Result<Answer, Failure> {
     let out = &arguments.out;
     let kind = out.extension().and_then(|kind| kind.to_str()).unwrap_or("");
     let known = match show {
@@ -34,6 +38,12 @@ pub(super) fn run(arguments: &Arguments, show: Show) -> Result<Answer, Failure> 
             format!("its ending decides what is written: .{}", known.join(", .")),
         ));
     }
+    if ros.is_some() && kind != "yaml" {
+        return Err(Failure::input_with_help(
+            "`--ros-mode` is for a map for ROS",
+            "name a .yaml file with `--out`",
+        ));
+    }
     let (situation, mut config) = situation(arguments)?;
     if let Some(method) = arguments.method {
         config.grouping.method = method;
@@ -44,14 +54,16 @@ pub(super) fn run(arguments: &Arguments, show: Show) -> Result<Answer, Failure> 
     if let Show::Costs(layer) = show {
         update.grid = mapper.layer(layer).map_or(update.grid, Arc::new);
     }
+    let mut too_dear = 0;
     let svg = || social(&situation, &update, &config, show);
     match kind {
         "svg" => write(out, svg().as_bytes())?,
         "png" => write(out, &png(&svg(), SCALE).map_err(Failure::internal)?)?,
         _ => {
-            let image = out.with_extension("pgm");
-            write(&image, &pgm(&update.grid))?;
-            write(out, yaml(&update.grid, &image).as_bytes())?;
+            let (mode, image) = (ros.unwrap_or_default(), out.with_extension("pgm"));
+            write(&image, &mode.image(&update.grid))?;
+            write(out, mode.description(&update.grid, &image).as_bytes())?;
+            too_dear = mode.too_dear(&update.grid);
         }
     }
     let mut text = format!(
@@ -62,6 +74,13 @@ pub(super) fn run(arguments: &Arguments, show: Show) -> Result<Answer, Failure> 
         update.groups.len(),
         out.display()
     );
+    if too_dear > 0 {
+        // Writing to a string does not fail.
+        let _ = writeln!(
+            text,
+            "{too_dear} cells cost more than {DEAREST}, the most that this scale has, and are written as that"
+        );
+    }
     for rejection in &update.rejected {
         // Writing to a string does not fail.
         let _ = writeln!(text, "{rejection}");
@@ -137,66 +156,9 @@ fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
         .map_err(|error| Failure::input(format!("cannot write {}: {error}", path.display())))
 }
 
-/// The darkest grey of a place that may be entered; a ROS map of mode `scale` takes black for occupied and
-/// white for free.
-const DEAREST_GREY: f32 = 80.0;
-
-/// The grid as a portable grey map, the highest row first: white costs 1, black is blocked.
-fn pgm(grid: &CostGrid) -> Vec<u8> {
-    let dearest = grid
-        .costs
-        .iter()
-        .copied()
-        .filter(|cost| cost.is_finite())
-        .fold(1.0, f32::max);
-    let grey = |cost: f32| {
-        if !cost.is_finite() {
-            0
-        } else if dearest > 1.0 {
-            let share = (cost - 1.0) / (dearest - 1.0);
-            (254.0 - share * (254.0 - DEAREST_GREY)).round() as u8
-        } else {
-            254
-        }
-    };
-    let mut bytes = format!("P5\n{} {}\n255\n", grid.width, grid.height).into_bytes();
-    for row in (0..grid.height).rev() {
-        let costs = &grid.costs[row * grid.width..(row + 1) * grid.width];
-        bytes.extend(costs.iter().map(|cost| grey(*cost)));
-    }
-    bytes
-}
-
-/// What ROS's map server reads beside the image.
-fn yaml(grid: &CostGrid, image: &Path) -> String {
-    let image = image
-        .file_name()
-        .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    format!(
-        "image: {image}\nmode: scale\nresolution: {}\norigin: [{}, {}, 0]\nnegate: 0\n\
-         occupied_thresh: 0.9\nfree_thresh: 0.01\n",
-        grid.resolution, grid.origin.x, grid.origin.y
-    )
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_ros_map_has_north_up_black_walls_and_white_floor() {
-        let mut grid = CostGrid::covering([0.0, 1.0, 0.3, 1.2], 0.1);
-        grid.costs[0] = f32::INFINITY;
-        grid.costs[1] = 4.0;
-        let bytes = pgm(&grid);
-        let (header, cells) = bytes.split_at(bytes.len() - 6);
-        assert_eq!(header, b"P5\n3 2\n255\n");
-        assert_eq!(cells, [254, 254, 254, 0, 80, 254]);
-        let text = yaml(&grid, Path::new("maps/floor.pgm"));
-        assert!(
-            text.starts_with("image: floor.pgm\nmode: scale\nresolution: 0.1\norigin: [0, 1, 0]")
-        );
-    }
 
     #[test]
     fn times_of_day_are_of_the_day_of_the_start() {
