@@ -207,16 +207,7 @@ impl CostGrid {
                 found: costs.len(),
             });
         }
-        // Written so that a NaN is refused as well.
-        if let Some(index) = costs
-            .iter()
-            .position(|cost| !matches!(cost, FREE..=BLOCKED))
-        {
-            return Err(GridError::Cost {
-                index,
-                cost: costs[index],
-            });
-        }
+        check(costs, 0)?;
         Ok(Self {
             origin,
             resolution,
@@ -224,6 +215,44 @@ impl CostGrid {
             height,
             costs: costs.to_vec(),
         })
+    }
+
+    /// Takes the cells of a region, as far as it lies on the grid, from `costs`, which are those of all cells.
+    ///
+    /// # Errors
+    /// [`GridError`] where there are more or fewer costs than cells, or one in the region is none; nothing changes then.
+    pub fn take_over(&mut self, region: &Region, costs: &[f32]) -> Result<(), GridError> {
+        if costs.len() != self.costs.len() {
+            return Err(GridError::Length {
+                width: self.width,
+                height: self.height,
+                found: costs.len(),
+            });
+        }
+        let region = region.common(&self.whole());
+        if region.is_empty() {
+            return Ok(());
+        }
+        for range in region.row_ranges(self.width) {
+            check(&costs[range.clone()], range.start)?;
+        }
+        for range in region.row_ranges(self.width) {
+            self.costs[range.clone()].copy_from_slice(&costs[range]);
+        }
+        Ok(())
+    }
+}
+
+/// Whether all of these are costs; the first stands at `first` in the grid.
+fn check(costs: &[f32], first: usize) -> Result<(), GridError> {
+    // Written so that a NaN is refused as well.
+    let wrong = |cost: &f32| !matches!(cost, FREE..=BLOCKED);
+    match costs.iter().position(wrong) {
+        Some(index) => Err(GridError::Cost {
+            index: first + index,
+            cost: costs[index],
+        }),
+        None => Ok(()),
     }
 }
 

@@ -1,7 +1,7 @@
 //! The agents as processes: each takes turns, gives its core what has come in, and does what the
 //! core decided. It guarantees that a turn whose snapshot was overtaken is left out, not guessed.
 
-use crate::grid::shared::{GridReadError, GridUpdate, GridWriter, SharedGrid, newest_grid, world};
+use crate::grid::shared::{GridReadError, GridUpdate, GridWriter, SharedGrid, follow_grid, world};
 use crate::human_observer::HumanObserver;
 use crate::messages::{
     CameraFrame, DETECTIONS, LASER, LaserScan, ODOMETRY, Odometry, SPEECH, Speech, VELOCITY,
@@ -159,9 +159,8 @@ pub fn navigation(mut session: Session, begin: Begin) -> Result<(), ProcessError
         pose = odometry.newest()?.or(pose);
         scan = scans.newest()?.or(scan);
         let snapshot = session.snapshot()?;
-        let known = grid.as_ref().map(|shared| &shared.handle);
-        match newest_grid(&mut session, &snapshot, known) {
-            Ok(newest) => grid = newest.or(grid),
+        match follow_grid(&mut session, &snapshot, &mut grid) {
+            Ok(_) => {}
             Err(GridReadError::Read(error)) => drop(current::<()>(Err(error))?),
             Err(error) => tracing::debug!(time = %tick.time, "no new grid: {error}"),
         }

@@ -1,11 +1,13 @@
 //! The grid in the graph, as a large value of the world: who gives it out and who reads it use this file.
-//! It owns the names of the attributes, and guarantees that a reader knows which cells may have changed.
+//! It owns the names of the attributes, and guarantees that a grid which is read in part equals one
+//! that is read whole.
 
 use super::{CostGrid, GridError, Region};
 use dsr::{
     LargeAttribute, LargeError, LargeHandle, LargeReadError, Node, NodeId, Owner, ReadError,
     Session, Snapshot, Transaction, Value,
 };
+use nalgebra::Point2;
 use std::sync::Arc;
 use std::time::Duration;
 use thiserror::Error;
@@ -50,18 +52,6 @@ pub struct SharedGrid {
     pub dirty: Region,
     /// The grid.
     pub grid: CostGrid,
-}
-
-impl SharedGrid {
-    /// Where it may differ from the grid that a reader `knows`, if any: who missed one takes all as changed.
-    pub fn changed_since(&self, knows: Option<&LargeHandle>) -> Region {
-        let known = knows.filter(|known| known.stream() == self.handle.stream());
-        match known.map(LargeHandle::sequence) {
-            Some(known) if known == self.handle.sequence() => Region::default(),
-            Some(known) if known.checked_add(1) == Some(self.handle.sequence()) => self.dirty,
-            _ => self.grid.whole(),
-        }
-    }
 }
 
 /// The world, once there is one.
@@ -130,22 +120,24 @@ pub enum GridReadError {
     Grid(#[from] GridError),
 }
 
-/// The social grid that a snapshot speaks of, where it is another than the one that the reader `knows`.
+/// Brings `grid` up to the social grid that a snapshot speaks of; whether that is another. Of one that follows the known
+/// one, only the cells that may have changed are read.
 ///
 /// # Errors
-/// [`GridReadError`].
-pub fn newest_grid(
+/// [`GridReadError`]; `grid` stays as it was.
+pub fn follow_grid(
     session: &mut Session,
     snapshot: &Snapshot,
-    knows: Option<&LargeHandle>,
-) -> Result<Option<SharedGrid>, GridReadError> {
+    grid: &mut Option<SharedGrid>,
+) -> Result<bool, GridReadError> {
     let Some(world) = world(snapshot)? else {
-        return Ok(None);
+        return Ok(false);
     };
     let value = world.value(SOCIAL_GRID)?;
     let handle = value.as_ref().and_then(Value::as_large);
-    let Some(handle) = handle.filter(|handle| Some(*handle) != knows) else {
-        return Ok(None);
+    let known = grid.as_ref().map(|known| &known.handle);
+    let Some(handle) = handle.filter(|handle| Some(*handle) != known) else {
+        return Ok(false);
     };
     let (place, dirty) = (
         world.value(SOCIAL_GRID_PLACE)?,
@@ -160,13 +152,59 @@ pub fn newest_grid(
     ) else {
         return Err(GridReadError::Beside);
     };
-    let shape = [height as usize, width as usize];
-    let grid = CostGrid::new([x, y].into(), resolution, shape, costs)?;
-    Ok(Some(SharedGrid {
+    let given = Given {
         handle: *handle,
-        dirty: dirty.common(&grid.whole()),
-        grid,
-    }))
+        origin: [x, y].into(),
+        resolution,
+        shape: [height as usize, width as usize],
+        dirty,
+        costs,
+    };
+    given.bring(grid)?;
+    Ok(true)
+}
+
+/// A grid as it lies in shared memory.
+struct Given<'a> {
+    handle: LargeHandle,
+    origin: Point2<f64>,
+    resolution: f64,
+    shape: [usize; 2],
+    dirty: Region,
+    costs: &'a [f32],
+}
+
+impl Given<'_> {
+    /// Makes `known` this grid, from the one before it where it is that.
+    fn bring(self, known: &mut Option<SharedGrid>) -> Result<(), GridError> {
+        if let Some(known) = known.as_mut().filter(|known| self.follows(known)) {
+            known.grid.take_over(&self.dirty, self.costs)?;
+            known.dirty = self.dirty.common(&known.grid.whole());
+            known.handle = self.handle;
+            return Ok(());
+        }
+        let grid = CostGrid::new(self.origin, self.resolution, self.shape, self.costs)?;
+        *known = Some(SharedGrid {
+            handle: self.handle,
+            dirty: self.dirty.common(&grid.whole()),
+            grid,
+        });
+        Ok(())
+    }
+
+    /// Whether this is the very next grid after `known`, over the same cells.
+    #[expect(
+        clippy::float_cmp,
+        reason = "asks for the same cells, not for similar ones"
+    )]
+    fn follows(&self, known: &SharedGrid) -> bool {
+        let grid = &known.grid;
+        known.handle.stream() == self.handle.stream()
+            && known.handle.sequence().checked_add(1) == Some(self.handle.sequence())
+            && grid.origin == self.origin
+            && grid.resolution == self.resolution
+            && [grid.height, grid.width] == self.shape
+    }
 }
 
 fn region(dirty: &Value) -> Option<Region> {
@@ -182,29 +220,99 @@ fn region(dirty: &Value) -> Option<Region> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::FREE;
     use super::*;
+    use proptest::prelude::*;
 
     fn region(columns: (usize, usize), rows: (usize, usize)) -> Region {
         Region { columns, rows }
     }
 
-    #[test]
-    fn whoever_missed_a_grid_takes_all_as_changed() {
-        let grid = CostGrid::covering([0.0, 0.0, 0.4, 0.2], 0.1);
-        let handle = |stream, sequence| LargeHandle::new(stream, sequence, 32, &[2, 4]).unwrap();
-        let shared = SharedGrid {
-            handle: handle(3, 7),
-            dirty: region((0, 1), (0, 1)),
-            grid,
-        };
-        assert!(shared.changed_since(Some(&handle(3, 7))).is_empty());
-        assert_eq!(shared.changed_since(Some(&handle(3, 6))), shared.dirty);
-        let whole = shared.grid.whole();
-        for (stream, sequence) in [(3, 5), (3, 8), (3, u64::MAX), (2, 6)] {
-            let known = handle(stream, sequence);
-            assert_eq!(shared.changed_since(Some(&known)), whole);
+    const SIZE: [usize; 2] = [5, 7];
+
+    fn handle(stream: u64, sequence: u64) -> LargeHandle {
+        let [height, width] = SIZE.map(|side| side as u32);
+        LargeHandle::new(
+            stream,
+            sequence,
+            4 * u64::from(height * width),
+            &[height, width],
+        )
+        .unwrap()
+    }
+
+    fn given(handle: LargeHandle, dirty: Region, costs: &[f32]) -> Given<'_> {
+        Given {
+            handle,
+            origin: Point2::new(-1.0, 2.0),
+            resolution: 0.1,
+            shape: SIZE,
+            dirty,
+            costs,
         }
-        assert_eq!(shared.changed_since(None), whole);
+    }
+
+    /// A grid of the same costs everywhere, read whole.
+    fn read(handle: LargeHandle, cost: f32) -> SharedGrid {
+        let mut known = None;
+        let costs = [cost; SIZE[0] * SIZE[1]];
+        given(handle, Region::default(), &costs)
+            .bring(&mut known)
+            .unwrap();
+        known.unwrap()
+    }
+
+    proptest! {
+        #[test]
+        fn reading_what_changed_leaves_what_reading_all_does(
+            changes in prop::collection::vec(((0..8usize, 0..8usize), (0..6usize, 0..6usize), 1.0..9.0f32), 1..12),
+        ) {
+            let mut costs = vec![FREE; SIZE[0] * SIZE[1]];
+            let mut known = Some(read(handle(3, 0), FREE));
+            for (number, (columns, rows, cost)) in (1..).zip(changes) {
+                let whole = known.as_ref().unwrap().grid.whole();
+                let dirty = region(columns, rows);
+                for range in dirty.common(&whole).row_ranges(SIZE[1]).filter(|r| r.start < r.end) {
+                    costs[range].fill(cost);
+                }
+                given(handle(3, number), dirty, &costs).bring(&mut known).unwrap();
+                let mut whole = None;
+                given(handle(3, number), dirty, &costs).bring(&mut whole).unwrap();
+                prop_assert_eq!(&known, &whole);
+            }
+        }
+    }
+
+    #[test]
+    fn only_the_next_grid_over_the_same_cells_is_read_in_part() {
+        let costs = [4.0; SIZE[0] * SIZE[1]];
+        let dirty = region((1, 3), (0, 2));
+        let brought = |given: Given<'_>| {
+            let mut known = Some(read(handle(3, 7), FREE));
+            given.bring(&mut known).unwrap();
+            let grid = known.unwrap().grid;
+            grid.costs.iter().filter(|cost| **cost > FREE).count()
+        };
+        assert_eq!(brought(given(handle(3, 8), dirty, &costs)), dirty.area());
+        for other in [handle(3, 9), handle(3, 6), handle(2, 8)] {
+            assert_eq!(brought(given(other, dirty, &costs)), costs.len());
+        }
+        let moved = Given {
+            origin: Point2::origin(),
+            ..given(handle(3, 8), dirty, &costs)
+        };
+        assert_eq!(brought(moved), costs.len());
+    }
+
+    #[test]
+    fn what_is_no_cost_leaves_the_grid_as_it_was() {
+        let mut costs = [4.0; SIZE[0] * SIZE[1]];
+        costs[2 * SIZE[1] + 2] = f32::NAN;
+        let before = Some(read(handle(3, 7), FREE));
+        let mut known = before.clone();
+        let error = given(handle(3, 8), region((0, 4), (0, 4)), &costs).bring(&mut known);
+        assert!(matches!(error, Err(GridError::Cost { index: 16, .. })));
+        assert_eq!(known, before);
     }
 
     #[test]
