@@ -2,9 +2,9 @@
 //! that is not drawn.
 
 use super::super::canvas::{FAINT, INK, PEOPLE, heat, line, number, rectangle, text};
-use super::{GROUP, Show, cost_colour, density_colour, is_crowd, passing};
+use super::{GROUP, Show, cost_colour, curve, density_colour, is_crowd, passing};
 use crate::situation::Situation;
-use agents::social_mapping::{SocialConfig, Update};
+use agents::social_mapping::{SocialConfig, Update, UsageCurve};
 use svg::node::element::Group;
 
 /// From line to line, px.
@@ -160,16 +160,17 @@ pub(super) fn column(
             .add(words(40.0, y, "personal space of a group", INK));
         y += LINE;
     }
-    if !update.objects.is_empty() && show == Show::Density {
+    if !update.objects.is_empty() {
         y += 6.0;
-        let curve = &config.usage;
-        let ends = [
-            format!("{} idle", curve.least),
-            format!("{} in use", curve.most),
-        ];
+        let ends = usage_ends(update, config);
+        // On the grid, only the edge of a space tells R(t) by its colour.
+        let (what, opacity) = match show {
+            Show::Density => ("Spaces of objects, R(t)", "0.6"),
+            Show::Costs(_) => ("Edges of objects' spaces, R(t)", "1"),
+        };
         column = column
-            .add(heading(y, "Spaces of objects, R(t)"))
-            .add(bar(y + 8.0, &heat, [&ends[0], &ends[1]]).set("fill-opacity", "0.6"));
+            .add(heading(y, what))
+            .add(bar(y + 8.0, &heat, [&ends[0], &ends[1]]).set("fill-opacity", opacity));
         y += 56.0;
     }
     let left_out = update.rejected.len();
@@ -188,4 +189,24 @@ pub(super) fn column(
         y += LINE;
     }
     (column, y - top)
+}
+
+/// What the ends of the colours of R(t) are: numbers where all objects have the same, words where not.
+fn usage_ends(update: &Update, config: &SocialConfig) -> [String; 2] {
+    let mut curves = update.objects.iter().map(|one| curve(config, one));
+    let [least, most] = ["idle".to_owned(), "in use".to_owned()];
+    let Some(first) = curves.next() else {
+        return [least, most];
+    };
+    let same = |one: &UsageCurve| {
+        one.least.to_bits() == first.least.to_bits() && one.most.to_bits() == first.most.to_bits()
+    };
+    if curves.all(same) {
+        [
+            format!("{} {least}", first.least),
+            format!("{} {most}", first.most),
+        ]
+    } else {
+        [least, most]
+    }
 }
