@@ -16,6 +16,7 @@
 mod kernel;
 
 pub use kernel::Source;
+pub(super) use kernel::density_within;
 
 use crate::grid::Region;
 use kernel::{Frame, Kernel, LIMIT, Lanes, SIDE, Tile, greater};
@@ -78,12 +79,23 @@ impl DensityField {
     #[inline(always)]
     fn draw_all(&mut self) {
         let across = self.across();
+        let mut bounds = vec![0.0; across + SIDE];
         // One row of tiles after the other, so that everybody's cells of it are in the nearest cache.
         for row in 0..self.frame.height.div_ceil(SIDE) {
             let tiles = &mut self.tiles[row * across..(row + 1) * across];
             tiles.fill([[LIMIT; SIDE]; SIDE]);
+            // First how great no deviation in a tile can be, then only whoever may have less somewhere in it.
+            bounds.fill(LIMIT.sqrt());
+            let mut near = Vec::with_capacity(self.people.len());
             for kernel in &self.people {
-                kernel.draw_row(row, tiles);
+                let reach = kernel.reach(row);
+                if !reach.is_empty() {
+                    kernel.bound_row(row, reach.clone(), &mut bounds);
+                    near.push((kernel, reach));
+                }
+            }
+            for (kernel, reach) in &near {
+                kernel.draw_row(row, reach.clone(), &bounds, tiles);
             }
             for tile in 0..across {
                 self.finish(row, tile);

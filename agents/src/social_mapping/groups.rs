@@ -4,6 +4,7 @@
 //! their order alone.
 
 mod clustering;
+mod crowd;
 mod entity;
 mod facing;
 mod mesh;
@@ -20,8 +21,8 @@ pub use tracking::GroupTracker;
 pub use triangulation::Triangulation;
 
 use self::near::Near;
-use nalgebra::{Isometry2, Point2};
 use super::scene::is_pose;
+use nalgebra::{Isometry2, Point2};
 use serde::{Deserialize, Serialize};
 
 /// Where more pairs of people than this stand within some [`NEARBY`] metres of each other, groups are

@@ -2,6 +2,8 @@
 //! a cell takes part where its centre does, and keeps the larger cost (READING.md item 7). Because
 //! drawing is a maximum, the order of stamps is indifferent and drawing twice is drawing once.
 
+mod zones;
+
 use super::four_sided::FourSided;
 use super::object_space::Outline;
 use super::personal::CooperationZone;
@@ -9,8 +11,9 @@ use super::scene::Wall;
 use super::zones::{Cuts, Zone};
 use crate::grid::{BLOCKED, CostGrid, FREE, Region};
 use nalgebra::{Isometry2, Point2, Vector2};
-use pulp::{Arch, NullaryFnOnce};
+use pulp::Arch;
 use std::sync::Arc;
+use zones::RaiseZones;
 
 /// How obstacles grow by the robot: blocked within `reach`, then dearer by `extra`, falling
 /// linearly to nothing over `width`.
@@ -263,66 +266,6 @@ fn raise(grid: &mut CostGrid, window: Region, cost: impl Fn(Point2<f64>) -> f32)
             let cell = (column, row);
             let index = grid.index(cell);
             grid.costs[index] = grid.costs[index].max(cost(grid.centre(cell)));
-        }
-    }
-}
-
-/// Raises each cell of the window to the cost of its zone. The same sums as for one place, without a
-/// branch, so that the widest vector unit that the processor has takes several cells at once.
-struct RaiseZones<'a> {
-    grid: &'a mut CostGrid,
-    window: Region,
-    world_from_person: &'a Isometry2<f64>,
-    shape: &'a FourSided,
-    cuts: &'a Cuts,
-}
-
-impl NullaryFnOnce for RaiseZones<'_> {
-    type Output = ();
-
-    #[allow(
-        clippy::inline_always,
-        reason = "only what is inlined into a function for a wide vector unit makes use of that"
-    )]
-    #[inline(always)]
-    fn call(self) {
-        let Self {
-            grid,
-            window,
-            world_from_person,
-            shape,
-            cuts,
-        } = self;
-        let position = world_from_person.translation.vector;
-        let heading = world_from_person.rotation;
-        let (cos, sin) = (heading.re, heading.im);
-        let [front, left, rear, right] = shape.sides().map(f64::recip);
-        let [intimate, personal, social] = [cuts.intimate, cuts.personal, cuts.social];
-        let costs = [Zone::Intimate, Zone::Personal, Zone::Social].map(Zone::cost);
-        let (x0, resolution) = (grid.origin.x, grid.resolution);
-        for row in window.rows.0..window.rows.1 {
-            let y = grid.centre((0, row)).y - position.y;
-            let first = grid.index((window.columns.0, row));
-            let cells = &mut grid.costs[first..first + window.columns.1 - window.columns.0];
-            for (at, cell) in cells.iter_mut().enumerate() {
-                // A grid has fewer cells than an i32 counts, which vector units turn into an f64.
-                let column = f64::from(((window.columns.0 + at) as u32).cast_signed()) + 0.5;
-                let x = x0 + column * resolution - position.x;
-                let (along, across) = (cos * x + sin * y, cos * y - sin * x);
-                // Of the two parts of each sum one is zero.
-                let ahead = if along > 0.0 { along } else { 0.0 };
-                let behind = if along < 0.0 { along } else { 0.0 };
-                let leftwards = if across > 0.0 { across } else { 0.0 };
-                let rightwards = if across < 0.0 { across } else { 0.0 };
-                let along = ahead * front + behind * rear;
-                let across = leftwards * left + rightwards * right;
-                let squared = along * along + across * across;
-                let mut cost = FREE;
-                cost = if squared <= social { costs[2] } else { cost };
-                cost = if squared <= personal { costs[1] } else { cost };
-                cost = if squared <= intimate { costs[0] } else { cost };
-                *cell = if cost > *cell { cost } else { *cell };
-            }
         }
     }
 }

@@ -10,6 +10,7 @@ use super::super::four_sided::FourSided;
 use crate::grid::Region;
 use nalgebra::{Isometry2, Point2, Vector2};
 use std::f32::consts::{LN_2, LOG2_E};
+use std::ops::Range;
 
 /// Side of a tile, cells: a row of it goes through a processor's vector units at once.
 pub(super) const SIDE: usize = 8;
@@ -218,7 +219,7 @@ impl Kernel {
 
     /// The tiles that it reaches of a row of them.
     #[inline(always)]
-    fn reach(&self, row: usize) -> std::ops::Range<usize> {
+    pub(super) fn reach(&self, row: usize) -> Range<usize> {
         let (below, above) = self.tiles.rows;
         if !(below..above).contains(&row) {
             return 0..0;
@@ -235,12 +236,37 @@ impl Kernel {
         start.min(end) / SIDE..end.div_ceil(SIDE)
     }
 
-    /// Lowers the squared deviations on a row of tiles to its own.
+    /// Lowers what no deviation in a tile of the row can exceed to what its own cannot.
     #[inline(always)]
-    pub(super) fn draw_row(&self, row: usize, tiles: &mut [Tile]) {
-        let reach = self.reach(row);
-        for (tile, cells) in reach.clone().zip(&mut tiles[reach]) {
-            self.draw(row, tile, cells);
+    pub(super) fn bound_row(&self, row: usize, reach: Range<usize>, bounds: &mut [f32]) {
+        for first in reach.step_by(SIDE) {
+            let at = self.at_tiles(row, first);
+            // Past its reach its own are beyond the limit, and lower nothing.
+            for (bound, squared) in bounds[first..first + SIDE].iter_mut().zip(at) {
+                *bound = less(*bound, self.most(squared));
+            }
+        }
+    }
+
+    /// Lowers the squared deviations on a row of tiles to its own, where these may be below the bounds.
+    #[inline(always)]
+    pub(super) fn draw_row(
+        &self,
+        row: usize,
+        reach: Range<usize>,
+        bounds: &[f32],
+        tiles: &mut [Tile],
+    ) {
+        for first in reach.clone().step_by(SIDE) {
+            let at = self.at_tiles(row, first);
+            let bounds = &bounds[first..first + SIDE];
+            let wins: [bool; SIDE] = std::array::from_fn(|i| self.may_win(at[i], bounds[i]));
+            let here = first..reach.end.min(first + SIDE);
+            for ((tile, cells), wins) in here.clone().zip(&mut tiles[here]).zip(wins) {
+                if wins {
+                    self.draw(row, tile, cells);
+                }
+            }
         }
     }
 
@@ -283,6 +309,12 @@ impl Kernel {
 /// on.
 #[inline(always)]
 pub(super) fn density(squared: f32) -> f32 {
+    density_within(squared, LIMIT)
+}
+
+/// The same with another limit, at most 30.
+#[inline(always)]
+pub(in super::super) fn density_within(squared: f32, limit: f32) -> f32 {
     // 2^t with t = whole + part, part in [-1/2, 1/2]: the whole goes into the exponent's bits. Adding this
     // number leaves the whole in the last bits of the sum.
     const ROUND: f32 = 12_582_912.0;
@@ -297,6 +329,6 @@ pub(super) fn density(squared: f32) -> f32 {
         power = power * part + coefficient;
     }
     // All ones within the limit: as a choice, it would be a branch.
-    let within = u32::from(squared < LIMIT).wrapping_neg();
+    let within = u32::from(squared < limit).wrapping_neg();
     f32::from_bits((whole.wrapping_add(127) << 23) & within) * power
 }

@@ -2,10 +2,11 @@
 //! mesh. It sees pairs, which TG's triangles cannot, and it expects people to stand closer where it
 //! is crowded, so one set of figures serves a sparse street and a full coffee break.
 
+use super::crowd::Crowd;
 use super::mesh::Mesh;
-use super::near::Near;
 use nalgebra::{Isometry2, Point2, Vector2};
 use serde::{Deserialize, Serialize};
+use std::cell::RefCell;
 use std::collections::BTreeSet;
 
 /// What speaks for and against two being in one group.
@@ -90,8 +91,8 @@ impl Facing {
             rules: self,
             people,
             places: &places,
-            // Beyond four radii somebody adds less than a thousandth.
-            near: Near::new(&places, 4.0 * self.crowd_radius),
+            crowd: Crowd::new(&places, self.crowd_radius),
+            bonds: RefCell::new(vec![Vec::new(); people.len()]),
             beside,
         };
         let mut partition = Partition::alone(people.len());
@@ -125,26 +126,34 @@ struct Scene<'a> {
     rules: &'a Facing,
     people: &'a [Isometry2<f64>],
     places: &'a [Point2<f64>],
-    near: Near<'a>,
+    crowd: Crowd,
+    /// Of the pairs asked for so far, by the smaller index: the greater one, and the bond.
+    bonds: RefCell<Vec<Vec<(usize, f64)>>>,
     beside: Vec<Vec<usize>>,
 }
 
 impl Scene<'_> {
     fn bond(&self, a: usize, b: usize) -> f64 {
         let (a, b) = (a.min(b), a.max(b));
+        let mut known = self.bonds.borrow_mut();
+        let known = &mut known[a];
+        if let Some((_, bond)) = known.iter().find(|(other, _)| *other == b) {
+            return *bond;
+        }
         let crowd = self.crowd(a, b);
-        self.rules.pair(&self.people[a], &self.people[b], crowd)
+        let bond = self.rules.pair(&self.people[a], &self.people[b], crowd);
+        known.push((b, bond));
+        bond
     }
 
     /// How many others are around two people, the near ones counting for more.
     fn crowd(&self, a: usize, b: usize) -> f64 {
-        let middle = nalgebra::center(&self.places[a], &self.places[b]);
-        let variance = self.rules.crowd_radius.powi(2);
-        self.near
-            .around(middle)
-            .filter(|other| *other != a && *other != b)
-            .map(|other| (-0.5 * (self.places[other] - middle).norm_squared() / variance).exp())
-            .sum()
+        let (from, to) = (self.places[a], self.places[b]);
+        // Both are as far from the middle between them.
+        let own = self.crowd.weight((to - from).norm_squared() / 4.0);
+        let all = self.crowd.around(nalgebra::center(&from, &to));
+        // All is a sum of which theirs are a part, but for rounding.
+        (all - 2.0 * own).max(0.0)
     }
 
     /// The sum of the bonds between two sets.
