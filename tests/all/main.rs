@@ -23,6 +23,7 @@ mod large_rules;
 mod leftovers;
 mod live_rules;
 mod missions;
+mod nowhere;
 mod path;
 mod plan;
 mod recording;

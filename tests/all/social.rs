@@ -10,7 +10,7 @@ use std::time::Duration;
 use tempfile::TempDir;
 
 /// Exit code, standard output and standard error.
-fn cortex(arguments: &[&str]) -> (i32, String, String) {
+pub(crate) fn cortex(arguments: &[&str]) -> (i32, String, String) {
     let output = Program::run(arguments);
     let words = |bytes| String::from_utf8(bytes).unwrap();
     (
@@ -20,13 +20,13 @@ fn cortex(arguments: &[&str]) -> (i32, String, String) {
     )
 }
 
-fn lines(text: &str) -> Vec<Value> {
+pub(crate) fn lines(text: &str) -> Vec<Value> {
     text.lines()
         .map(|line| serde_json::from_str(line).unwrap())
         .collect()
 }
 
-fn person(id: u32, x: f64, y: f64, heading: f64) -> Value {
+pub(crate) fn person(id: u32, x: f64, y: f64, heading: f64) -> Value {
     json!({"id": id, "x_m": x, "y_m": y, "theta_rad": heading})
 }
 
@@ -53,7 +53,7 @@ fn recording(folder: &TempDir, truth: bool) -> String {
     )
 }
 
-fn save(folder: &TempDir, name: &str, text: &str) -> String {
+pub(crate) fn save(folder: &TempDir, name: &str, text: &str) -> String {
     let path = folder.path().join(name);
     fs::write(&path, text).unwrap();
     path.to_str().unwrap().to_owned()
@@ -364,49 +364,6 @@ fn an_agenda_that_ends_before_it_starts_is_refused_wherever_one_is_read() {
             );
         }
     }
-}
-
-#[test]
-fn whoever_is_nowhere_is_left_out_by_name_and_changes_nothing_for_others() {
-    let folder = tempfile::tempdir().unwrap();
-    let people = [
-        person(1, 0.0, 0.0, 0.0),
-        person(2, 1.2, 0.0, PI),
-        person(3, 1e100, 0.0, 0.0),
-    ];
-    let frame = |people: &[Value]| json!({"t": 0.5, "people": people});
-    let file = json!({"frames": [frame(&people)]}).to_string();
-    let file = save(&folder, "far.json", &file);
-    for method in ["facing", "gaussian_clustering"] {
-        let (code, out, err) = cortex(&["social", "groups", &file, "--method", method, "--json"]);
-        assert_eq!(code, 0, "{err}");
-        assert_eq!(
-            lines(&out)[0],
-            json!({"t": 0.5, "groups": [[1, 2]], "left_out": [3]})
-        );
-    }
-    let (_, out, _) = cortex(&["social", "groups", &file]);
-    assert_eq!(
-        out.trim(),
-        "0.5  {1 2}  left out, at no place within 1e8 m: 3"
-    );
-    let map = folder.path().join("far.svg").display().to_string();
-    let (code, out, err) = cortex(&["social", "map", &file, "--out", &map]);
-    assert_eq!(code, 0, "{err}");
-    assert!(
-        out.contains("person 3 is ignored: the pose is no place within 1e8 m"),
-        "{out}"
-    );
-    let near = json!({"frames": [frame(&people[..2])]}).to_string();
-    let near = save(&folder, "near.json", &near);
-    let alone = folder.path().join("near.svg").display().to_string();
-    let (code, _, err) = cortex(&["social", "map", &near, "--out", &alone]);
-    assert_eq!(code, 0, "{err}");
-    let read = |path: &str| {
-        let text = std::fs::read_to_string(path).unwrap();
-        text.replace(">far", ">near")
-    };
-    assert_eq!(read(&map), read(&alone));
 }
 
 #[test]

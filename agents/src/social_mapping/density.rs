@@ -145,38 +145,60 @@ impl DensityField {
                 for i in 0..count {
                     let tile = first + i;
                     let cells = &mut self.tiles[row * across + tile];
+                    if !(leaves[i] || enters[i]) {
+                        continue;
+                    }
+                    let before = *cells;
                     if leaves[i] && old.give_way(&new, row, tile, cells) {
                         let bound = new.most(is[i]).min(LIMIT.sqrt());
                         open.push((row, tile, bound));
                         around = around.joined(&one(row, tile));
                         continue;
                     }
-                    if enters[i] && !leaves[i] {
+                    if !leaves[i] {
                         new.draw(row, tile, cells);
                     }
-                    if enters[i] || leaves[i] {
+                    if differ(&before, cells) {
                         self.finish(row, tile);
                     }
                 }
             }
         }
-        let mut near = Vec::with_capacity(self.people.len());
-        for (other, kernel) in self.people.iter().enumerate() {
-            if other != index && kernel.tiles.meets(&around) {
-                near.push(other);
-            }
+        self.fill(index, &open, &around);
+        for (row, tile, _) in open {
+            self.finish(row, tile);
         }
+    }
+
+    /// Draws everybody but one in the open tiles, all of them `around`, as far as they may have less there than is known.
+    #[inline(always)]
+    fn fill(&mut self, but: usize, open: &[(usize, usize, f32)], around: &Region) {
+        let across = self.across();
+        let ((left, right), bottom) = (around.columns, around.rows.0);
+        let stride = right.saturating_sub(left).next_multiple_of(SIDE);
+        // Nothing is less than what is no number: so are tiles that are not open.
+        let mut bounds = vec![f32::NAN; stride * around.rows.1.saturating_sub(bottom)];
         for (row, tile, bound) in open {
-            let cells = &mut self.tiles[row * across + tile];
-            for other in &near {
-                let other = &self.people[*other];
-                if other.tiles.meets(&one(row, tile))
-                    && other.may_win(other.at_tile(row, tile), bound)
-                {
-                    other.draw(row, tile, cells);
+            bounds[(row - bottom) * stride + tile - left] = *bound;
+        }
+        for (other, kernel) in self.people.iter().enumerate() {
+            let here = kernel.tiles.common(around);
+            if other == but || here.is_empty() {
+                continue;
+            }
+            for row in here.rows.0..here.rows.1 {
+                for first in (left..right).step_by(SIDE) {
+                    let at = kernel.at_tiles(row, first);
+                    let bounds = &bounds[(row - bottom) * stride + first - left..][..SIDE];
+                    let wins: [bool; SIDE] =
+                        std::array::from_fn(|i| kernel.may_win(at[i], bounds[i]));
+                    for (tile, wins) in (first..).zip(wins) {
+                        if wins && (here.columns.0..here.columns.1).contains(&tile) {
+                            kernel.draw(row, tile, &mut self.tiles[row * across + tile]);
+                        }
+                    }
                 }
             }
-            self.finish(row, tile);
         }
     }
 
@@ -210,6 +232,18 @@ impl DensityField {
             }
         }
     }
+}
+
+/// Whether a cell of two tiles differs.
+#[inline(always)]
+fn differ(one: &Tile, other: &Tile) -> bool {
+    let mut bits = [0; SIDE];
+    for (one, other) in one.iter().zip(other) {
+        for i in 0..SIDE {
+            bits[i] |= one[i].to_bits() ^ other[i].to_bits();
+        }
+    }
+    bits.iter().any(|bits| *bits != 0)
 }
 
 /// A tile by itself.

@@ -100,7 +100,7 @@ mod tests {
 
     /// One row of cells.
     fn grid(costs: &[f32]) -> CostGrid {
-        let mut grid = CostGrid::covering([0.0, 1.0, 0.1 * costs.len() as f64, 1.1], 0.1);
+        let mut grid = CostGrid::covering([0.0, 0.0, costs.len() as f64, 1.0], 1.0);
         grid.costs.copy_from_slice(costs);
         grid
     }
@@ -153,8 +153,8 @@ mod tests {
                     let read = FREE + new as f32 * STEP;
                     assert!((read - cost).abs() < 1e-5, "{read} for {cost}");
                 }
-                // ROS 1 stretches its scale from 1 to 99.
-                assert!((old - new).abs() <= 1, "{old} for {new}");
+                // ROS 1 stretches its scale from 1 to 99, and cuts what is between.
+                assert!((old - new).abs() <= 2, "{old} for {new}");
             }
         }
     }

@@ -190,13 +190,6 @@ impl Kernel {
         ]
     }
 
-    /// The squared deviation at the centre of a tile.
-    #[inline(always)]
-    pub(super) fn at_tile(&self, row: usize, tile: usize) -> f32 {
-        let [x, y] = self.place_of_tile(row, tile);
-        self.squared(x, y)
-    }
-
     /// The squared deviations at the centres of a row of tiles.
     #[inline(always)]
     pub(super) fn at_tiles(&self, row: usize, first: usize) -> Lanes {
