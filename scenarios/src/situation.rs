@@ -5,23 +5,25 @@
 use crate::metrics::mapped;
 use crate::scenario::Scenario;
 use crate::scenes::Frame;
-use agents::social_mapping::scene::{
-    Activity, BODY_RADIUS, Manner, Person, Rejection, SceneError, is_pose,
+use agents::social_mapping::scene::{Activity, BODY_RADIUS, Manner, Person, Rejection, SceneError};
+use agents::social_mapping::{
+    ConfigError, SocialConfig, SocialMapper, SocialScene, Update, extent,
 };
-use agents::social_mapping::{ConfigError, SocialConfig, SocialMapper, SocialScene, Update};
 use dsr::Time;
 use nalgebra::{Isometry2, Point2, Vector2};
 use std::collections::BTreeMap;
 
-/// Around the people of a recording, metres: as far as social space reaches.
-const AROUND: f64 = 2.5;
+/// Beyond the outlines of zones of a recording, metres, so that they can be told from the edge.
+const AROUND: f64 = 0.3;
+/// The map of a recording with nobody in it, metres from its origin.
+const NOBODY: f64 = 2.5;
 
 /// A moment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Situation {
     /// What it is a moment of.
     pub name: String,
-    /// When, for people.
+    /// When, for people; empty where that is of no account.
     pub moment: String,
     /// When, for R(t).
     pub now: Time,
@@ -46,16 +48,9 @@ pub enum SituationError {
 }
 
 impl Situation {
-    /// A frame of a recording, on an open floor around its people. Features that `config` does not
+    /// A frame of a recording, on an open floor as far as the zones of its people and groups reach. Features that `config` does not
     /// know are left out.
     pub fn of_frame(name: &str, frame: &Frame, config: &SocialConfig) -> Self {
-        // Whoever is nowhere is left out by the map, which says so.
-        let placed = || frame.people.iter().filter(|one| is_pose(&one.pose));
-        let places = || placed().map(|one| one.pose.translation.vector);
-        let low = places().reduce(|a, b| a.inf(&b)).unwrap_or_default();
-        let high = places().reduce(|a, b| a.sup(&b)).unwrap_or_default();
-        let margin = Vector2::repeat(AROUND);
-        let (low, high) = (low - margin, high + margin);
         let mut rejected = Vec::new();
         let mut people = Vec::with_capacity(frame.people.len());
         for one in &frame.people {
@@ -81,16 +76,25 @@ impl Situation {
                 },
             });
         }
+        let mut situation = Self::of_people(name, Time::from_seconds(frame.time), people, config);
+        situation.moment = format!("t = {}", frame.time);
+        situation.scene.rejected = rejected;
+        situation
+    }
+
+    /// These people on an open floor, as far as their zones and those of their groups reach.
+    pub fn of_people(name: &str, now: Time, people: Vec<Person>, config: &SocialConfig) -> Self {
+        let extent = extent(config, &people);
+        let [left, bottom, right, top] = extent.unwrap_or([-NOBODY, -NOBODY, NOBODY, NOBODY]);
         Self {
             name: name.to_owned(),
-            moment: format!("t = {}", frame.time),
-            now: Time::from_seconds(frame.time),
+            moment: String::new(),
+            now,
             scene: SocialScene {
-                bounds: [low.x, low.y, high.x, high.y],
+                bounds: [left - AROUND, bottom - AROUND, right + AROUND, top + AROUND],
                 robot_radius: BODY_RADIUS,
                 social: true,
                 people,
-                rejected,
                 ..SocialScene::default()
             },
             rooms: Vec::new(),
@@ -216,9 +220,18 @@ mod tests {
         let cost = |x, y| grid.cost(grid.cell_at(Point2::new(x, y)).unwrap());
         assert!((cost(0.72, 0.0) - 4.0).abs() < 1e-6);
         assert!(cost(0.0, 4.0) >= BLOCKED);
-        assert!((cost(3.0, 2.5) - FREE).abs() < 1e-6);
+        assert!((cost(2.5, 2.5) - FREE).abs() < 1e-6);
 
+        // The map ends beyond everybody's zones, however far they reach: here 2.146 widths.
+        let reach = |front: f64| front * (-2.0 * 0.1f64.ln()).sqrt() + AROUND;
+        let [left, bottom, right, top] = Situation::of_frame("two", &frame, &config).scene.bounds;
+        // To the left, the group's personal space reaches furthest: its members stand 0.7 m from its middle.
+        let group = 0.7 - 1.7 * (-2.0 * 0.5f64.ln()).sqrt() - AROUND;
+        assert!((left - group).abs() < 1e-6 && (right - (1.4 + reach(0.5))).abs() < 1e-6);
+        assert!((bottom + reach(0.75)).abs() < 1e-6 && (top - (4.0 + reach(0.75))).abs() < 1e-6);
         frame.people[2].activity = Some("in_the_bathroom".into());
+        let [left, .., top] = Situation::of_frame("two", &frame, &config).scene.bounds;
+        assert!((left + reach(2.5)).abs() < 1e-6 && (top - (4.0 + reach(2.5))).abs() < 1e-6);
         frame.people[0].features = Some("emotional_state=merry".into());
         let (update, _) = map(&frame).unwrap();
         assert!((update.people[2].shape.rear - 2.5).abs() < 1e-12);

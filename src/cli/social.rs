@@ -1,7 +1,8 @@
 //! The flags of `cortex social` and `cortex experiment`. Parsing a flag does nothing but parse it.
 
-use agents::social_mapping::Layer;
 use agents::social_mapping::groups::Method;
+use agents::social_mapping::preset::Preset;
+use agents::social_mapping::{Layer, Levels, Proxemics, UsageCurve};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
@@ -100,6 +101,15 @@ pub(crate) struct SocialPicture {
     /// How groups are found [default: as the figures say]
     #[arg(long, value_name = "M", value_parser = method())]
     pub(crate) method: Option<Method>,
+    /// People's widths and levels by name [default: as the figures say]
+    #[arg(long, value_name = "P", value_parser = preset::<Proxemics>())]
+    pub(crate) proxemics: Option<Proxemics>,
+    /// The densities at which zones end by name [default: as the figures say]
+    #[arg(long, value_name = "L", value_parser = preset::<Levels>())]
+    pub(crate) levels: Option<Levels>,
+    /// R(t) by name [default: as the figures say]
+    #[arg(long, value_name = "U", value_parser = preset::<UsageCurve>())]
+    pub(crate) usage: Option<UsageCurve>,
 }
 
 #[derive(Debug, Clone, Args)]
@@ -112,6 +122,9 @@ pub(crate) struct Experiment {
     /// For `perception`: recorded pedestrians (`obsmat.txt`, or frame id x y) in place of simulated ones
     #[arg(long, value_name = "FILE")]
     pub(crate) tracks: Option<PathBuf>,
+    /// For `tg-shapes` and `tg-groups`: write the figures as ours are to this folder (.svg and .png)
+    #[arg(long, value_name = "DIR")]
+    pub(crate) pictures: Option<PathBuf>,
     /// For machines
     #[arg(long)]
     pub(crate) json: bool,
@@ -155,6 +168,11 @@ fn ros_mode() -> impl TypedValueParser<Value = RosMode> {
         let named = |mode: &RosMode| mode.name() == name;
         RosMode::ALL.into_iter().find(named).unwrap_or_default()
     })
+}
+
+fn preset<T: Preset + Clone + Send + Sync + Default>() -> impl TypedValueParser<Value = T> {
+    let names = T::PRESETS.iter().map(|(name, _)| *name);
+    PossibleValuesParser::new(names).map(|name| T::find_preset(&name).unwrap_or_default())
 }
 
 fn method() -> impl TypedValueParser<Value = Method> {

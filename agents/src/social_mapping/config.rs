@@ -99,27 +99,12 @@ pub struct ConfigError {
 impl SocialConfig {
     /// Paper AP's figures: personal space is a circle of 1.2 m, intimate space one of 0.4 m (AP 1), walking
     /// stretches it ahead (AP 2.1), and what lies outside costs as much as free space. The layers are AP's
-    /// in any case.
+    /// in any case. In configuration, `proxemics = "adaptive_proxemics"`.
     pub fn adaptive_proxemics() -> Self {
-        const PERSONAL: f64 = 1.2;
-        const INTIMATE: f64 = 0.4;
-        let level = 0.5f64;
-        let width = PERSONAL / (-2.0 * level.ln()).sqrt();
-        let intimate = (-0.5 * (INTIMATE / width).powi(2)).exp();
-        let shape = AsymmetricGaussian {
-            front: width,
-            side: width,
-            rear: width,
-        };
         Self {
             proxemics: Proxemics {
-                shape,
-                levels: Levels {
-                    intimate,
-                    personal: level,
-                    // Just outside of the personal zone: AP knows no further one.
-                    social: 0.999 * level,
-                },
+                shape: AsymmetricGaussian::adaptive_proxemics(),
+                levels: Levels::adaptive_proxemics(),
             },
             ..Self::default()
         }

@@ -173,6 +173,16 @@ impl Features {
         Ok(values)
     }
 
+    /// The text that [`Self::parse`] reads these values from, to a thousandth.
+    pub fn text(values: &BTreeMap<String, f64>) -> String {
+        let one = |(name, value): (&String, &f64)| {
+            // Not rounded to 0, which is no value.
+            let value = (value * 1e3).round().max(1.0) / 1e3;
+            format!("{name}={value}")
+        };
+        values.iter().map(one).collect::<Vec<_>>().join(", ")
+    }
+
     /// The influence value to each side, `iv = FV . IV` (front, left, rear, right). Features that
     /// are not known have none.
     pub fn influence(&self, values: &BTreeMap<String, f64>) -> [f64; 4] {
@@ -265,6 +275,16 @@ mod tests {
             .influence
             .left = 1.5;
         assert!(!features.is_valid());
+    }
+
+    #[test]
+    fn values_are_written_as_they_are_read() {
+        let features = Features::default();
+        let text = "emotional_state=0.7, food_need=0.001";
+        let values = features.parse(text).unwrap();
+        assert_eq!(Features::text(&values), text);
+        let least = [("role".to_owned(), 1e-9)].into();
+        assert_eq!(Features::text(&least), "role=0.001");
     }
 
     #[test]

@@ -3,14 +3,14 @@
 //! frame, so the surface is continuous everywhere.
 
 use super::four_sided::{FourSided, WIDTHS};
+use super::preset::{Named, Preset, named_or_table};
 use nalgebra::{Isometry2, Point2};
 use serde::{Deserialize, Serialize};
 
 /// The standard deviations of a person's space to the front, the sides and the rear, metres.
 ///
-/// In configuration also the name of a preset: `hall` or `printed`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Spelled")]
+/// In configuration also the name of a [`Preset`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AsymmetricGaussian {
     /// Along the heading.
     pub front: f64,
@@ -20,40 +20,23 @@ pub struct AsymmetricGaussian {
     pub rear: f64,
 }
 
-/// How widths are written: by name, or one by one.
 #[derive(Deserialize)]
-#[serde(
-    untagged,
-    expecting = "`hall`, `printed`, or widths as { front = 1.0, side = 0.75, rear = 0.5 }"
-)]
-enum Spelled {
-    Preset(String),
-    Widths(Widths),
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(remote = "AsymmetricGaussian", deny_unknown_fields)]
 struct Widths {
     front: f64,
     side: f64,
     rear: f64,
 }
 
-/// There are no widths of that name.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("there are no widths `{name}`; there are `hall` and `printed`")]
-pub struct UnknownPreset {
-    name: String,
-}
+named_or_table!(AsymmetricGaussian, Widths);
 
-impl TryFrom<Spelled> for AsymmetricGaussian {
-    type Error = UnknownPreset;
-    fn try_from(spelled: Spelled) -> Result<Self, UnknownPreset> {
-        match spelled {
-            Spelled::Preset(name) => Self::find_preset(&name).ok_or(UnknownPreset { name }),
-            Spelled::Widths(Widths { front, side, rear }) => Ok(Self { front, side, rear }),
-        }
-    }
+impl Preset for AsymmetricGaussian {
+    const WHAT: &'static str = "widths";
+    const PRESETS: &'static [Named<Self>] = &[
+        ("hall", || Self::HALL),
+        ("printed", || Self::PRINTED),
+        ("adaptive_proxemics", Self::adaptive_proxemics),
+    ];
 }
 
 impl AsymmetricGaussian {
@@ -71,12 +54,14 @@ impl AsymmetricGaussian {
         rear: 1.0,
     };
 
-    /// The preset of that name: `hall` or `printed`.
-    pub fn find_preset(name: &str) -> Option<Self> {
-        match name {
-            "hall" => Some(Self::HALL),
-            "printed" => Some(Self::PRINTED),
-            _ => None,
+    /// The same to all sides, as paper AP has personal space: with the density .5 at 1.2 m (AP 1).
+    pub fn adaptive_proxemics() -> Self {
+        const PERSONAL: f64 = 1.2;
+        let width = PERSONAL / (-2.0 * 0.5f64.ln()).sqrt();
+        Self {
+            front: width,
+            side: width,
+            rear: width,
         }
     }
 

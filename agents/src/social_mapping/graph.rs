@@ -6,7 +6,7 @@ mod groups;
 mod read;
 
 use groups::GroupNodes;
-pub use groups::{EXTENT, GROUP, MEMBER};
+pub use groups::{EXTENT, FEATURES, GROUP, MEMBER};
 pub use read::scene;
 
 use super::adaptation::Passage;

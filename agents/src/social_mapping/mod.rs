@@ -22,6 +22,7 @@ pub mod layers;
 pub mod map;
 pub mod object_space;
 pub mod personal;
+pub mod preset;
 pub mod scene;
 mod stamps;
 mod visibility;
@@ -29,7 +30,7 @@ pub mod zones;
 
 pub use comfort::{Comfort, ComfortScene};
 pub use config::{ConfigError, SocialConfig};
-pub use found::FoundGroup;
+pub use found::{FoundGroup, extent};
 pub use four_sided::FourSided;
 pub use gaussian::AsymmetricGaussian;
 pub use graph::{SocialMapping, Turn};

@@ -2,6 +2,7 @@
 //! READING.md items 9 and 11). This file owns the shapes and R(t); both are closed form, and R(t)
 //! stays within its bounds whatever the agenda.
 
+use super::preset::{Named, Preset, named_or_table};
 use dsr::Time;
 use nalgebra::{Isometry2, Point2, Vector2};
 use serde::{Deserialize, Serialize};
@@ -183,9 +184,9 @@ impl Agenda {
     }
 }
 
-/// R(t): what crossing an object's space costs as its activities approach and recede (TD Fig. 8).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+/// R(t): what crossing an object's space costs as its activities approach and recede (TD Fig. 8). In configuration also
+/// the name of a [`Preset`] (READING.md item 9).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct UsageCurve {
     /// With no activity near.
     pub least: f64,
@@ -196,6 +197,39 @@ pub struct UsageCurve {
     pub ramp: f64,
     /// Rise and fall in steps instead of linearly.
     pub steps: Option<Steps>,
+}
+
+#[derive(Deserialize)]
+#[serde(remote = "UsageCurve", default, deny_unknown_fields)]
+struct UsageTable {
+    least: f64,
+    most: f64,
+    ramp: f64,
+    steps: Option<Steps>,
+}
+
+impl Default for UsageTable {
+    fn default() -> Self {
+        let UsageCurve {
+            least,
+            most,
+            ramp,
+            steps,
+        } = UsageCurve::default();
+        Self {
+            least,
+            most,
+            ramp,
+            steps,
+        }
+    }
+}
+
+named_or_table!(UsageCurve, UsageTable);
+
+impl Preset for UsageCurve {
+    const WHAT: &'static str = "curves";
+    const PRESETS: &'static [Named<Self>] = &[("linear", Self::default), ("steps", Self::stepped)];
 }
 
 /// Steps of R(t), instead of a line.

@@ -3,6 +3,7 @@
 
 use super::four_sided::squared_deviation_at;
 use super::gaussian::AsymmetricGaussian;
+use super::preset::{Named, Preset, named_or_table};
 use crate::grid::{BLOCKED, FREE};
 use nalgebra::{Isometry2, Point2};
 use serde::{Deserialize, Serialize};
@@ -39,9 +40,8 @@ impl Zone {
     }
 }
 
-/// The densities at which the zones end.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// The densities at which the zones end. In configuration also the name of a [`Preset`] (READING.md item 6).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Levels {
     /// Intimate at and above this density.
     pub intimate: f64,
@@ -49,6 +49,26 @@ pub struct Levels {
     pub personal: f64,
     /// Social at and above this density.
     pub social: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(remote = "Levels", deny_unknown_fields)]
+struct LevelsTable {
+    intimate: f64,
+    personal: f64,
+    social: f64,
+}
+
+named_or_table!(Levels, LevelsTable);
+
+impl Preset for Levels {
+    const WHAT: &'static str = "levels";
+    const PRESETS: &'static [Named<Self>] = &[
+        ("hall", Self::default),
+        ("authors_9_6_3", || Self::of([0.9, 0.6, 0.3])),
+        ("authors_8_5_2", || Self::of([0.8, 0.5, 0.2])),
+        ("adaptive_proxemics", Self::adaptive_proxemics),
+    ];
 }
 
 impl Default for Levels {
@@ -62,6 +82,24 @@ impl Default for Levels {
 }
 
 impl Levels {
+    fn of([intimate, personal, social]: [f64; 3]) -> Self {
+        Self {
+            intimate,
+            personal,
+            social,
+        }
+    }
+
+    /// Paper AP's: with its widths, personal space ends at 1.2 m and intimate space at 0.4 m (AP 1); what lies outside
+    /// is like free space, so a social zone ends just outside of the personal one.
+    pub fn adaptive_proxemics() -> Self {
+        const INTIMATE: f64 = 0.4;
+        const PERSONAL: f64 = 0.5;
+        let width = AsymmetricGaussian::adaptive_proxemics().front;
+        let intimate = (-0.5 * (INTIMATE / width).powi(2)).exp();
+        Self::of([intimate, PERSONAL, 0.999 * PERSONAL])
+    }
+
     /// Whether the zones are nested: 0 < social < personal < intimate < 1.
     pub fn is_valid(&self) -> bool {
         0.0 < self.social
@@ -81,14 +119,40 @@ impl Levels {
     }
 }
 
-/// The model of people's space: a density and the levels that cut it into zones.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+/// The model of people's space: a density and the levels that cut it into zones. In configuration also the name of a
+/// [`Preset`].
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Proxemics {
     /// The density of a standing person.
     pub shape: AsymmetricGaussian,
     /// Where the zones end.
     pub levels: Levels,
+}
+
+#[derive(Deserialize)]
+#[serde(remote = "Proxemics", deny_unknown_fields)]
+struct ProxemicsTable {
+    #[serde(default)]
+    shape: AsymmetricGaussian,
+    #[serde(default)]
+    levels: Levels,
+}
+
+named_or_table!(Proxemics, ProxemicsTable);
+
+impl Preset for Proxemics {
+    const WHAT: &'static str = "proxemics";
+    const PRESETS: &'static [Named<Self>] = &[
+        ("hall", Self::default),
+        ("printed", || Self {
+            shape: AsymmetricGaussian::PRINTED,
+            ..Self::default()
+        }),
+        ("adaptive_proxemics", || Self {
+            shape: AsymmetricGaussian::adaptive_proxemics(),
+            levels: Levels::adaptive_proxemics(),
+        }),
+    ];
 }
 
 impl Proxemics {
@@ -193,7 +257,7 @@ mod tests {
         assert_eq!(zone(1.19), Zone::Social);
         assert_eq!(zone(2.16), Zone::Public);
         assert_eq!(zone(-0.24), Zone::Personal);
-        let printed = AsymmetricGaussian::find_preset("printed").unwrap();
+        let printed = AsymmetricGaussian::PRINTED;
         assert!((printed.distance_at(0.0, 0.9).unwrap() - 0.92).abs() < 0.005);
         assert!((printed.distance_at(0.0, 0.5).unwrap() - 2.35).abs() < 0.006);
     }

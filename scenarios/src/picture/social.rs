@@ -13,7 +13,7 @@ use crate::situation::Situation;
 use agents::social_mapping::object_space::Outline;
 use agents::social_mapping::{Layer, ObjectUse, SocialConfig, Update, UsageCurve, Zone};
 use cells::is_crowd;
-use nalgebra::{Point2, Vector2};
+use nalgebra::{Isometry2, Point2, Vector2};
 use svg::Document;
 use svg::node::element::{Group, Rectangle};
 
@@ -29,6 +29,8 @@ const OUTLINE: usize = 72;
 const BANDS: u32 = 9;
 /// Groups: Okabe and Ito's reddish purple.
 const GROUP: &str = "#aa3377";
+/// Half the width of what is kept free of words around the head of an arrow, px.
+const ARROW: f64 = 5.0;
 /// With more people than this, nobody is named.
 const NAMED: usize = 40;
 
@@ -66,7 +68,10 @@ pub fn social(situation: &Situation, update: &Update, config: &SocialConfig, sho
         Show::Costs(Layer::Master) => "what a place costs the robot".to_owned(),
         Show::Costs(layer) => format!("what a place costs the robot, layer {}", layer.name()),
     };
-    let line = format!("{what}, {}", situation.moment);
+    let line = match situation.moment.as_str() {
+        "" => what,
+        moment => format!("{what}, {moment}"),
+    };
     let subtitle = text(BORDER, BORDER + 36.0, &line, 13.0).set("fill", INK);
     let document = Document::new()
         .set("viewBox", format!("0 0 {width} {height}"))
@@ -280,7 +285,7 @@ fn groups(view: &View, update: &Update, config: &SocialConfig) -> Group {
         for member in found.members.iter().filter_map(place) {
             group = group.add(view.line(centre, member).set("stroke-width", "2.2"));
         }
-        let ahead = pose * Point2::new(0.45, 0.0);
+        let ahead = ahead_of_group(pose);
         group = group
             .add(arrow(view, centre, ahead).set("fill", GROUP))
             .add(
@@ -293,6 +298,11 @@ fn groups(view: &View, update: &Update, config: &SocialConfig) -> Group {
     all
 }
 
+/// Where the arrow ends that shows which way a group faces.
+fn ahead_of_group(world_from_group: &Isometry2<f64>) -> Point2<f64> {
+    world_from_group * Point2::new(0.45, 0.0)
+}
+
 /// The groups' numbers, after the names of people.
 fn label_groups(view: &View, update: &Update, labels: &mut Labels) {
     for (index, found) in update.groups.iter().enumerate() {
@@ -303,7 +313,6 @@ fn label_groups(view: &View, update: &Update, labels: &mut Labels) {
             bold: true,
         };
         let words = format!("group {}", index + 1);
-        labels.keep_off(centre, 5.0);
         if !labels.beside(centre, 6.0, &words, look) {
             labels.beside(centre, view.px(0.9), &words, look);
         }
@@ -346,6 +355,11 @@ fn walls(view: &View, situation: &Situation) -> Group {
 fn people(view: &View, update: &Update, situation: &Situation, labels: &mut Labels) -> Group {
     let spaces = &update.people;
     let mut group = Group::new();
+    for found in update.groups.iter() {
+        let pose = &found.entity.world_from_group;
+        labels.keep_off(view.page(pose.translation.vector.into()), 5.0);
+        labels.keep_off(view.page(ahead_of_group(pose)), ARROW);
+    }
     for person in spaces {
         let radius = situation
             .scene
@@ -367,6 +381,7 @@ fn people(view: &View, update: &Update, situation: &Situation, labels: &mut Labe
                 .set("fill", INK),
         );
         labels.keep_off(view.page(centre), view.px(radius));
+        labels.keep_off(view.page(ahead), ARROW);
     }
     if spaces.len() <= NAMED {
         for person in spaces {

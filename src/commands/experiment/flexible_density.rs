@@ -262,8 +262,8 @@ impl Shortened {
         let width = match self {
             Self::Rounded => width,
             Self::Cut => {
-                let unit = 10f64.powi(-(digits as i32));
-                (width / unit + 1e-9).floor() * unit
+                let units = 10u32.pow(digits as u32);
+                (width * f64::from(units) + 1e-9).floor() / f64::from(units)
             }
         };
         format!("{width:.digits$}")

@@ -1,6 +1,7 @@
 //! `cortex experiment`: the papers' tables and figures, ours beside what is printed. This module owns
 //! the list of those there are, and guarantees that every one listed runs.
 
+mod drawn;
 mod drives;
 mod flexible_density;
 mod perception;
@@ -23,6 +24,15 @@ struct Experiment {
     /// Does it with so many seeds, where chance plays a part.
     run: fn(u64) -> Result<Table, Failure>,
 }
+
+/// Draws the figures of an experiment as ours are.
+type Draw = fn() -> Result<Vec<drawn::Drawn>, Failure>;
+
+/// The experiments that have pictures.
+const PICTURES: &[(&str, Draw)] = &[
+    ("tg-shapes", social_shapes::pictures),
+    ("tg-groups", social_groups::pictures),
+];
 
 /// Every experiment, in the order of the papers.
 const EXPERIMENTS: &[Experiment] = &[
@@ -104,6 +114,17 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
         return Ok(Answer::Yes);
     }
     let experiment = find(&arguments.name)?;
+    let drawing = PICTURES.iter().find(|(name, _)| *name == experiment.name);
+    let pictures = match (&arguments.pictures, drawing) {
+        (None, _) => Vec::new(),
+        (Some(folder), Some((_, draw))) => drawn::write(&draw()?, folder)?,
+        (Some(_), None) => {
+            let names: Vec<&str> = PICTURES.iter().map(|(name, _)| *name).collect();
+            let what = format!("`{}` has no pictures", experiment.name);
+            let help = format!("`--pictures` is for {}", names.join(" and "));
+            return Err(Failure::input_with_help(what, help));
+        }
+    };
     let table = match &arguments.tracks {
         None => (experiment.run)(arguments.seeds)?,
         Some(tracks) if experiment.name == perception::NAME => {
@@ -122,7 +143,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
         }
         print_json(&json)?;
     } else {
-        print(&table.text(experiment.name, experiment.about))?;
+        let mut text = table.text(experiment.name, experiment.about);
+        if !pictures.is_empty() {
+            // Writing to a string does not fail.
+            let _ = writeln!(text, "\npictures: {}", pictures.join(", "));
+        }
+        print(&text)?;
     }
     Ok(Answer::Yes)
 }

@@ -48,6 +48,13 @@ pub(super) fn run(
     if let Some(method) = arguments.method {
         config.grouping.method = method;
     }
+    config.proxemics = arguments.proxemics.unwrap_or(config.proxemics);
+    config.proxemics.levels = arguments.levels.unwrap_or(config.proxemics.levels);
+    if let Some(usage) = arguments.usage {
+        // Of all objects, those included that have a curve of their own.
+        config.usage = usage;
+        config.usage_of.clear();
+    }
     let (mut update, mapper) = situation
         .map(&config)
         .map_err(|error| refused(&arguments.file, error))?;

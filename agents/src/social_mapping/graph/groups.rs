@@ -3,7 +3,8 @@
 
 use super::super::found::FoundGroup;
 use super::super::groups::GroupTracker;
-use super::{MOVED, TURNED, flat, is_near, polyline};
+use super::{MOVED, TURNED, flat, is_near, polyline, remove};
+use crate::social_mapping::features::Features;
 use crate::social_mapping::map::Update;
 use dsr::{EdgeRef, Node, Operation, ReadError, Snapshot, Time, Transaction, Value};
 use nalgebra::Isometry2;
@@ -15,6 +16,8 @@ pub const GROUP: &str = "group";
 pub const MEMBER: &str = "member_of";
 /// How far a group reaches ahead, to the left, behind and to the right of its centre.
 pub const EXTENT: &str = "extent";
+/// What a group feels and wants, like a person's: the mean over those of whom it is known. Absent where it is of nobody.
+pub const FEATURES: &str = "features";
 /// The outline of a group's personal zone, like a person's.
 const ZONE: &str = "personal_zone";
 /// A group that is not found for so long is over, seconds.
@@ -141,10 +144,11 @@ fn show(
         let Some(found) = group.found else {
             return Ok(());
         };
-        let attributes = vec![
+        let mut attributes = vec![
             (EXTENT.to_owned(), extent(found)),
             (ZONE.to_owned(), flat(&found.personal)),
         ];
+        attributes.extend(features(found).map(|text| (FEATURES.to_owned(), text)));
         transaction.create_node(GROUP, &name, attributes);
         place(transaction, snapshot, &name, &found.entity.world_from_group)?;
     } else if let (Some(node), Some(found)) = (node, group.found) {
@@ -161,6 +165,11 @@ fn show(
             transaction.set(node.id(), EXTENT, extent(found));
             transaction.set(node.id(), ZONE, flat(&found.personal));
         }
+        match features(found) {
+            None => remove(transaction, node, &[FEATURES])?,
+            Some(text) if node.value(FEATURES)?.as_ref() == Some(&text) => {}
+            Some(text) => transaction.set(node.id(), FEATURES, text),
+        }
     }
     for left in had.difference(&group.members) {
         transaction.delete_edge(left.as_str(), MEMBER, name.as_str());
@@ -169,6 +178,12 @@ fn show(
         transaction.create_edge(joined.as_str(), MEMBER, name.as_str());
     }
     Ok(())
+}
+
+/// What is known of a group's features.
+fn features(group: &FoundGroup) -> Option<Value> {
+    let known = (!group.features.is_empty()).then(|| Features::text(&group.features));
+    known.map(Value::from)
 }
 
 fn extent(group: &FoundGroup) -> Value {

@@ -93,7 +93,7 @@ impl NullaryFnOnce for RaiseZones<'_> {
             let first = grid.index((start, row));
             let cells = &mut grid.costs[first..first + end - start];
             // Zones are some thousand cells wide at most.
-            let from_own = (start as i64 - own as i64) as i32;
+            let from_own = (start as f64 - own) as i32;
             for (at, cell) in cells.iter_mut().enumerate() {
                 let x = (from_own + (at as u32).cast_signed()) as f32 * step + beyond;
                 let (along, across) = (cos * x + y_along, y_across - sin * x);

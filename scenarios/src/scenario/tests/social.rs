@@ -51,7 +51,9 @@ fn what_social_mapping_cannot_use_is_told_with_its_place() {
         panic!("one problem");
     };
     assert!(
-        problem.contains("there are no widths `hal`; there are `hall` and `printed`"),
+        problem.contains(
+            "there are no widths `hal`; there are `hall`, `printed` and `adaptive_proxemics`"
+        ),
         "{problem}"
     );
     let problems = with("[social]\nresolution = 0\nclearance_cost = -1");

@@ -31,8 +31,23 @@ fn groups_are_nodes_that_last_while_people_come_and_go() {
     let extent = centre.value("group_1", EXTENT).unwrap();
     assert_eq!(extent.as_f64s().unwrap().len(), 4);
 
+    // What the group feels is the mean of those of whom it is known.
+    let features = |centre: &Centre| match centre.value("group_1", FEATURES) {
+        Some(Value::String(text)) => text,
+        other => format!("{other:?}"),
+    };
+    assert_eq!(features(&centre), "None");
+    centre.set("ana", "features", "emotional_state=happy, role=staff");
+    centre.set("bo", "features", "emotional_state=sad");
+    centre.turn(&mut agent, noon() + 0.1);
+    assert_eq!(features(&centre), "emotional_state=0.77, role=0.8");
+    centre.set("ana", "features", "");
+    centre.set("bo", "features", "");
+    centre.turn(&mut agent, noon() + 0.2);
+    assert_eq!(features(&centre), "None");
+
     // A turn in which nothing changes writes nothing.
-    let (turn, _) = centre.turn(&mut agent, noon() + 0.2);
+    let (turn, _) = centre.turn(&mut agent, noon() + 0.3);
     assert!(turn.transaction.is_empty());
 
     // Somebody joins, and the agent is started anew: it is the same group.
