@@ -218,6 +218,12 @@ pub enum Problem {
         /// Type of the node that it enters.
         to: String,
     },
+    /// A value that the schema does not let an attribute have.
+    #[error("this can never be assigned: {reason}")]
+    NeverAssigned {
+        /// Why.
+        reason: String,
+    },
     /// A combo that no rule says what it does.
     #[error("this combo cannot be applied as one: {reason}")]
     NotUnfolded {

@@ -280,6 +280,18 @@ pub enum Literal {
     Boolean(bool),
 }
 
+impl Literal {
+    /// The value.
+    pub fn value(&self) -> dsr::Value {
+        match self {
+            Self::Integer(value) => (*value).into(),
+            Self::Real(value) => (*value).into(),
+            Self::Text(text) => text.as_str().into(),
+            Self::Boolean(value) => (*value).into(),
+        }
+    }
+}
+
 /// An arithmetic operation on numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Arithmetic {

@@ -6,8 +6,8 @@ use super::program::{Change, Link, Operator, Place, Program, Quantified, Term, T
 use super::vocabulary::{TypeSet, Vocabulary};
 use dsr::Schema;
 use grammar::{
-    AttributePath, Condition, Effect, Expression, Goal, Grammar, Kind, Literal, Name, Pattern,
-    PatternEdge, PatternNode, Rule, Types,
+    AttributePath, Condition, Effect, Expression, Goal, Grammar, Kind, Name, Pattern, PatternEdge,
+    PatternNode, Rule, Types,
 };
 
 /// Why a rule or goal cannot be compiled.
@@ -74,12 +74,7 @@ impl Scope<'_> {
 
     fn term(&mut self, expression: &Expression) -> Result<Term, Reason> {
         Ok(match expression {
-            Expression::Literal(literal) => Term::Constant(match literal {
-                Literal::Integer(value) => (*value).into(),
-                Literal::Real(value) => (*value).into(),
-                Literal::Text(text) => text.as_str().into(),
-                Literal::Boolean(value) => (*value).into(),
-            }),
+            Expression::Literal(literal) => Term::Constant(literal.value()),
             Expression::Attribute(path) => Term::Place(self.place(path)?),
             Expression::Arithmetic { operator, operands } => Term::Arithmetic(
                 *operator,

@@ -2,7 +2,7 @@
 //!
 //! Guarantee: a draft never has a link that something asked not to be there.
 
-use crate::{AttributePath, Comparison, Condition, Expression, Literal, PatternNode, Types};
+use crate::{AttributePath, Comparison, Condition, Expression, PatternNode, Types};
 use dsr::{EdgeRef, Transaction, Value};
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -380,12 +380,7 @@ fn compared(
         Expression::Attribute(path) => {
             owner(path, places).and_then(|owner| draft.values.get(&owner).cloned())
         }
-        Expression::Literal(literal) => Some(match literal {
-            Literal::Integer(n) => (*n).into(),
-            Literal::Real(x) => (*x).into(),
-            Literal::Text(text) => text.as_str().into(),
-            Literal::Boolean(b) => (*b).into(),
-        }),
+        Expression::Literal(literal) => Some(literal.value()),
         Expression::Arithmetic { .. } => None,
     };
     let known = (value(left), value(right));

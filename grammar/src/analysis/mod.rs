@@ -6,6 +6,8 @@
 
 mod complete;
 mod conflict;
+mod contradiction;
+mod facts;
 mod kinds;
 mod manifest;
 mod never;

@@ -2,10 +2,12 @@
 #![allow(clippy::needless_raw_string_hashes, reason = "expect-test writes them")]
 
 use crate::testing::oracle::Model;
-use crate::testing::random::{AWKWARD, Words, soup};
+use crate::testing::random::{AWKWARD, FEW, Words, soup};
 use crate::testing::repair::repaired;
 use crate::testing::{CARE, care_centre, read};
-use crate::{Condition, Defects, Diagnostic, Grammar, Name, PatternNode, Rule, parse_grammar};
+use crate::{
+    Condition, Defects, Diagnostic, Grammar, Name, PatternNode, Problem, Rule, parse_grammar,
+};
 use dsr::{Graph, Schema, Time};
 use expect_test::{Expect, expect};
 use proptest::prelude::*;
@@ -26,6 +28,8 @@ none : active(1) { { a:t a->a(l) } => { a:t } precondition { (and (> a.n 5) (<= 
 some : active(1) { { a:t a->a(l) } => { a:t } precondition { (and (> a.n 5) (<= a.n 6)) } }
 text : active(1) { { a:t a->a(l) } => { a:t } precondition { (or (= 1 2) (= a.s \"x\")) } }
 idle : active(1) { { a:t b:t a->a(l) } => { a:t b:t } precondition { (exists u:t v:t (l a v)) } }
+lone : active(1) { { a:t a->a(l) } => { a:t } precondition { (exists u:t (l a a)) } }
+any : active(1) { { a:t a->a(l) } => { a:t } precondition { (exists u:t (and)) } }
 dormant deep : active(1) { { a:t a->a(l) } => { a:t } }
 ";
     check(
@@ -36,8 +40,108 @@ dormant deep : active(1) { { a:t a->a(l) } => { a:t } }
             test.aggl:5:1: warning: this rule never matches: no `a.n` is (> 5) and (<= 5)
             test.aggl:8:26: warning: nothing uses `b`: it only asks for one more `t`
             test.aggl:8:78: warning: nothing uses `u`: it only asks for one more `t`
-            test.aggl:9:9: warning: this rule can never be applied: it is dormant, and no rule activates it"#]],
+            test.aggl:9:70: warning: nothing uses `u`: it only asks for one more `t`
+            test.aggl:11:9: warning: this rule can never be applied: it is dormant, and no rule activates it"#]],
     );
+}
+
+/// What is said of a rule with nodes `a` and `b` of a type, a link `l` between them, and this precondition.
+fn said(precondition: &str, schema: Option<&Schema>) -> Vec<String> {
+    let text = format!(
+        "name=x\n===\nr : active(1) {{ {{ a:t b:t a->b(l) b->a(l)* }} => {{ a:t b:t }} \
+         precondition {{ {precondition} }} }}\n"
+    );
+    let found = read(&text).analyse(schema);
+    found.iter().map(ToString::to_string).collect()
+}
+
+#[test]
+fn contradictions_are_found_wherever_they_are() {
+    let never = [
+        "(not (= 1 1))",
+        "(and (= a.s \"A\") (= a.s \"B\"))",
+        "(and (= a.s \"A\") (= a.s 3))",
+        "(and (= a.s true) (= a.s false))",
+        "(= true false)",
+        "(and (= a.n 3) (!= a.n 3))",
+        "(and (>= a.n 3) (<= a.n 3) (!= a.n 3))",
+        "(and (= a.s \"A\") (not (= a.s \"A\")))",
+        "(and (= a.s b.s) (not (= b.s a.s)))",
+        "(and (< a.n b.n) (>= a.n b.n))",
+        "(and (< (+ a.n 1) b.n) (not (> b.n (+ a.n 1))))",
+        "(< a.n a.n)",
+        "(!= a a)",
+        "(not (exists q:t (l a q)))",
+        "(forall q:t (not (l a q)))",
+        "(forall q:t (l q a))",
+        "(forall q:t (when (l a q) (not (l a q))))",
+        "(exists q:t (and (l a q) (not (l a q))))",
+        "(exists q:t (and (> q.n 1) (< q.n 1)))",
+        "(not (forall q:t (or (l a q) (not (l a q)))))",
+        "(or (and (> a.n 2) (< a.n 1)) (l b a))",
+        "(and (or (l b a) (= a.s 1)) (= a.s 2))",
+        "(and (> a.n 2) (not (>= a.n 2)))",
+        "(and (when (l a b) (= a.s 1)) (= a.s 2))",
+    ];
+    for condition in never {
+        let said = said(condition, None);
+        assert!(
+            said[0].starts_with("this rule never matches: "),
+            "{condition}: {said:?}"
+        );
+    }
+    let may = [
+        "(and (!= a.s true) (!= a.s false))",
+        "(and (not (= a.n 3)) (not (!= a.n 3)))",
+        "(and (not (< a.n 3)) (not (>= a.n 3)))",
+        "(not (< a.n a.n))",
+        "(!= a.n a.n)",
+        "(not (exists q:u (l a q)))",
+        "(exists q:t (= q a))",
+        "(and (exists q:t (l b q)) (exists q:t (not (l b q))))",
+        "(or (and (> a.n 2) (< a.n 1)) (l a a))",
+        "(and (> a.n 9007199254740992) (<= a.n 9007199254740993))",
+        "(and (> a.n 2) (< b.n 2))",
+    ];
+    for condition in may {
+        assert_eq!(said(condition, None), Vec::<String>::new(), "{condition}");
+    }
+}
+
+#[test]
+fn ranges_and_kinds_of_the_schema_are_held_against_every_part_of_a_condition() {
+    let schema = r#"
+        [types]
+        t = []
+        [labels]
+        l = { from = ["t"], to = ["t"] }
+        [attributes]
+        n = { kind = "f64", min = 0.0, max = 10.0 }
+        on = { kind = "bool" }
+        name = { kind = "string" }
+        "#;
+    let schema = Schema::from_toml("schema", schema).unwrap();
+    for (condition, reason) in [
+        (
+            "(or (> a.n 11) (< a.n -1))",
+            "no `a.n` is (>= 0, by the schema) and (<= 10, by the schema) and (> 11); \
+             and otherwise no `a.n` is (>= 0, by the schema) and (<= 10, by the schema) and (< -1)",
+        ),
+        (
+            "(exists q:t (= q.n 12))",
+            "no `q.n` is (>= 0, by the schema) and (<= 10, by the schema) and (= 12)",
+        ),
+        ("(= a.n \"A\")", "`a.n` is never (= \"A\") by the schema"),
+        ("(= a.name 3)", "`a.name` is never (= 3) by the schema"),
+        (
+            "(and (!= a.on true) (!= a.on false))",
+            "no `a.on` is (!= true) and (!= false)",
+        ),
+    ] {
+        let expected = vec![format!("this rule never matches: {reason}")];
+        assert_eq!(said(condition, Some(&schema)), expected, "{condition}");
+    }
+    assert!(said("(or (> a.n 9) (< a.n -1))", Some(&schema)).is_empty());
 }
 
 #[test]
@@ -88,6 +192,27 @@ crack : active(1) { { e:egg p:room e->p(in) } => { p:room } }
             test.aggl:6:1: warning: this rule can never be applied: there is never a `pan`
             test.aggl:7:1: warning: this rule can never be applied: there is never a link `in` like `e->p`"#]],
     );
+}
+
+proptest! {
+    #![proptest_config(crate::testing::cases(600))]
+
+    #[test]
+    fn a_rule_that_is_said_never_to_match_does_not(
+        rule in FEW.rule(),
+        models in prop::collection::vec(Model::strategy(), 8),
+    ) {
+        let rule = repaired(rule);
+        let mut grammar = read("name=x\n===\n");
+        grammar.rules.push(rule.clone());
+        let never = |found: &Diagnostic| matches!(found.problem, Problem::NeverMatches { .. });
+        if let Some(found) = grammar.analyse(None).iter().find(|found| never(found)) {
+            for model in models {
+                let mut all = model.assignments(&rule).into_iter();
+                prop_assert!(!all.any(|at| model.rule_holds(&rule, &at)), "{found}: {rule}");
+            }
+        }
+    }
 }
 
 /// One label and one type, so that every graph of three nodes can be tried.

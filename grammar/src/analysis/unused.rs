@@ -62,7 +62,8 @@ impl Uses {
             Condition::Exists { variables, body } | Condition::Forall { variables, body } => {
                 let mut inner = Self::default();
                 inner.condition(body, findings);
-                self.quantified(variables, inner, findings);
+                let asks = !matches!(&**body, Condition::And(all) if all.is_empty());
+                self.quantified(variables, inner, asks, findings);
             }
             Condition::When {
                 condition,
@@ -74,10 +75,16 @@ impl Uses {
         }
     }
 
-    fn quantified(&mut self, variables: &[PatternNode], mut inner: Self, found: &mut Vec<Finding>) {
+    /// Variables of a quantifier. With nothing in it, it asks only whether there is one.
+    fn quantified(
+        &mut self,
+        variables: &[PatternNode],
+        mut inner: Self,
+        asks: bool,
+        found: &mut Vec<Finding>,
+    ) {
         for variable in variables {
-            // That there is one at all can be what a formula without it asks.
-            if !inner.0.remove(&variable.variable) && variables.len() > 1 {
+            if !inner.0.remove(&variable.variable) && (asks || variables.len() > 1) {
                 found.push(at(&variable.variable, unused(variable)));
             }
         }
@@ -100,7 +107,7 @@ impl Uses {
                 Effect::Forall { variables, body } => {
                     let mut inner = Self::default();
                     inner.effects(body, findings);
-                    self.quantified(variables, inner, findings);
+                    self.quantified(variables, inner, !body.is_empty(), findings);
                 }
                 Effect::When { condition, body } => {
                     self.condition(condition, findings);

@@ -326,7 +326,7 @@ impl<'a> Changes<'a> {
 }
 
 /// The number as another kind, if it is the same number there.
-fn convert(value: &Value, kind: ValueKind) -> Option<Value> {
+pub(crate) fn convert(value: &Value, kind: ValueKind) -> Option<Value> {
     use Number::{Real, Whole};
     let number = Number::of(value)?;
     let whole = match number {

@@ -9,6 +9,7 @@ mod effect;
 use crate::matching::{CHOICE_LIMIT, Compiler, Environment, Interrupt, Link, Slot};
 use crate::{Binding, Grammar, MatchError, Obstacle, Rule};
 pub use change::CHANGE_LIMIT;
+pub(crate) use change::convert;
 use change::{Changes, End};
 use dsr::{Change, NodeId, Operation, ReadError, Refusal, RuleEngine, Snapshot};
 use std::sync::Arc;

@@ -3,13 +3,14 @@
 //! Guarantee: a rule without complaints uses only types, labels and attributes that the schema
 //! has, and its links join types that the schema lets them join.
 
+use crate::apply::convert;
 use crate::matching::MatchDomain;
 use crate::parser::Finding;
 use crate::{
     AttributePath, Condition, Diagnostic, Effect, Expression, Goal, Grammar, Name, Pattern,
     PatternNode, Problem, Rule, SourceFile,
 };
-use dsr::{Schema, suggest};
+use dsr::{Schema, SchemaError, Value, suggest};
 
 impl Grammar {
     /// What of the grammar does not fit the schema; nothing if the schema is open.
@@ -237,6 +238,35 @@ impl SchemaCheck<'_> {
         }
     }
 
+    /// A value that the store would refuse.
+    fn assigned(&mut self, target: &AttributePath, value: &Expression) {
+        let (AttributePath::Node { attribute, .. } | AttributePath::Edge { attribute, .. }) =
+            target;
+        let Some(id) = self.schema.find_attribute(attribute) else {
+            return;
+        };
+        let kind = self.schema.attributes()[usize::from(id.0)].kind;
+        let fitted = |value: &Value| {
+            let converted = kind.and_then(|kind| convert(value, kind));
+            converted.unwrap_or_else(|| value.clone())
+        };
+        let refused = match value {
+            Expression::Literal(literal) => {
+                self.schema.check_value(id, &fitted(&literal.value())).err()
+            }
+            // Whatever the number, it is one.
+            Expression::Arithmetic { .. } => {
+                let refused = self.schema.check_value(id, &fitted(&Value::I64(0))).err();
+                refused.filter(|error| matches!(error, SchemaError::WrongKind { .. }))
+            }
+            Expression::Attribute(_) => None,
+        };
+        if let Some(error) = refused {
+            let reason = error.to_string();
+            self.report(attribute, Problem::NeverAssigned { reason });
+        }
+    }
+
     fn condition(&mut self, condition: &Condition, scope: &mut Vec<PatternNode>) {
         match condition {
             Condition::Edge { label, from, to } => self.link(label, from, to, scope),
@@ -290,6 +320,7 @@ impl SchemaCheck<'_> {
                 Effect::Assign { target, value } => {
                     self.path(target);
                     self.expression(value);
+                    self.assigned(target, value);
                 }
                 Effect::Create {
                     variable,
@@ -345,6 +376,8 @@ mod tests {
             front = { from = ["person"], to = ["robot"] }
             [attributes]
             distance = { kind = "f64" }
+            level = { kind = "u32", max = 9.0 }
+            name = { kind = "string" }
             "#,
         )
         .unwrap()
@@ -355,6 +388,39 @@ mod tests {
         let diagnostics = read(CARE).check_schema(&schema());
         assert!(diagnostics.is_empty(), "{}", Defects { diagnostics });
         assert!(read(CARE).check_schema(&Schema::open()).is_empty());
+    }
+
+    #[test]
+    fn values_that_the_store_would_refuse_are_told() {
+        let text = "name=x
+===
+r : active(1)
+{
+	{ a:room }
+	=>
+	{ a:room }
+	effect
+	{
+		(assign a.level 10)
+		(assign a.level -1)
+		(assign a.level 2.5)
+		(assign a.level \"low\")
+		(assign a.name 3)
+		(forall p:person (assign p.name (+ a.level 1)))
+		(assign a.level 9.0)
+		(assign a.level (+ a.level 1))
+		(assign a.name \"hall\")
+	}
+}
+";
+        let diagnostics = read(text).check_schema(&schema());
+        expect![[r#"
+            test.aggl:10:13: error: this can never be assigned: `level` must lie in [-inf, 9], not 10
+            test.aggl:11:13: error: this can never be assigned: `level` is a u32, not a i64
+            test.aggl:12:13: error: this can never be assigned: `level` is a u32, not a f64
+            test.aggl:13:13: error: this can never be assigned: `level` is a u32, not a string
+            test.aggl:14:13: error: this can never be assigned: `name` is a string, not a i64
+            test.aggl:15:30: error: this can never be assigned: `name` is a string, not a i64"#]].assert_eq(&Defects { diagnostics }.to_string());
     }
 
     #[test]

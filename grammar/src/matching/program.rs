@@ -8,8 +8,8 @@ use super::choice::Choices;
 use super::domain::Domain;
 use super::query::Bound;
 use crate::{
-    Arithmetic, AttributePath, Comparison, Condition, Expression, Literal, Name, PatternEdge,
-    PatternNode, Types,
+    Arithmetic, AttributePath, Comparison, Condition, Expression, Name, PatternEdge, PatternNode,
+    Types,
 };
 use dsr::{AttributeId, LabelId, NodeId, Schema, Value};
 
@@ -197,7 +197,7 @@ impl<'a> Compiler<'a> {
 
     pub(crate) fn term(&self, expression: &Expression) -> Result<Term, MatchError> {
         Ok(match expression {
-            Expression::Literal(literal) => Term::Constant(constant(literal)),
+            Expression::Literal(literal) => Term::Constant(literal.value()),
             Expression::Attribute(AttributePath::Node {
                 variable,
                 attribute,
@@ -219,15 +219,6 @@ impl<'a> Compiler<'a> {
                 Term::Arithmetic(*operator, operands.collect::<Result<_, _>>()?)
             }
         })
-    }
-}
-
-fn constant(literal: &Literal) -> Value {
-    match literal {
-        Literal::Integer(value) => Value::I64(*value),
-        Literal::Real(value) => Value::F64(*value),
-        Literal::Text(text) => Value::String(text.clone()),
-        Literal::Boolean(value) => Value::Bool(*value),
     }
 }
 
