@@ -47,6 +47,22 @@ fn scenario(folder: &Path, rules: &str, goal: &str) {
     fs::write(folder.join("missions/invite.aggt"), goal).unwrap();
 }
 
+/// A store, an executive and a world, and a session with the store.
+fn start(folder: &Path, instance: &TestInstance) -> ([Member; 3], Session) {
+    let common = [
+        "--scenario",
+        folder.to_str().unwrap(),
+        "--instance",
+        instance.name(),
+    ];
+    let store = Member::start(&[&["store"], &common[..]].concat());
+    let session = Session::attach(&instance.0, "watch", PATIENCE).unwrap();
+    let executive = Member::start(&[&["agent", "executive"], &common[..]].concat());
+    // Slow, so that the executive does not lose its patience before the rule comes.
+    let world = Member::start(&[&["agent", "world", "--speed", "0.2"], &common[..]].concat());
+    ([store, executive, world], session)
+}
+
 /// The texts of an attribute of all nodes of a type.
 fn texts(snapshot: &Snapshot, type_name: &str, attribute: &str) -> Vec<String> {
     let nodes = snapshot.nodes().map(Result::unwrap);
@@ -85,14 +101,8 @@ fn a_mission_uses_a_rule_that_was_loaded_later_and_a_bad_grammar_changes_nothing
         &without,
         "{ \"robot\":robot \"kitchen\":room \"robot\"->\"kitchen\"(in) }\n",
     );
-    let place = folder.path().to_str().unwrap();
     let name = instance.name();
-    let common = ["--scenario", place, "--instance", name];
-    let _store = Member::start(&[&["store"], &common[..]].concat());
-    let mut session = Session::attach(&instance.0, "watch", PATIENCE).unwrap();
-    let _executive = Member::start(&[&["agent", "executive"], &common[..]].concat());
-    // Slow, so that the executive does not lose its patience before the rule comes.
-    let _world = Member::start(&[&["agent", "world", "--speed", "0.2"], &common[..]].concat());
+    let (_members, mut session) = start(folder.path(), &instance);
     until(&mut session, "a mission without a plan", |snapshot| {
         texts(snapshot, "mission", "status").contains(&"running".to_owned())
             && !texts(snapshot, "mission", "reason").concat().is_empty()
@@ -174,4 +184,64 @@ fn a_mission_uses_a_rule_that_was_loaded_later_and_a_bad_grammar_changes_nothing
     assert_eq!(room(&session.snapshot().unwrap()), "corridor");
     // Where it does not hold any more, the answer is no.
     assert_eq!(apply(&binding).status.code(), Some(1));
+}
+
+#[test]
+fn a_rule_that_one_agent_wakes_is_planned_with_by_another_until_it_is_put_to_sleep() {
+    let instance = TestInstance::new("sleeping-rules");
+    let folder = tempfile::tempdir().unwrap();
+    let care = fs::read_to_string(root().join("scenarios/care-centre/rules.aggl")).unwrap();
+    // Nobody plans with a passive rule, so that another process must apply it.
+    let sleeping = care.replace("changeRoom : active", "dormant changeRoom : active")
+        + "\nunlock : passive(1) activates(changeRoom) { { r:robot } => { r:robot } }\n";
+    scenario(
+        folder.path(),
+        &sleeping,
+        "{ \"robot\":robot \"kitchen\":room \"robot\"->\"kitchen\"(in) }\n",
+    );
+    let name = instance.name();
+    let (_members, mut session) = start(folder.path(), &instance);
+    until(&mut session, "a mission without a plan", |snapshot| {
+        texts(snapshot, "mission", "status").contains(&"running".to_owned())
+            && !texts(snapshot, "mission", "reason").concat().is_empty()
+    });
+    let file = folder.path().join("rules.aggl");
+    let file = file.to_str().unwrap();
+    let apply = |rule: &str, binding: &[&str]| {
+        let arguments = ["rules", "apply", file, "--rule", rule, "--instance", name];
+        let output = Program::run(&[&arguments[..], binding].concat());
+        let said = [output.stdout, output.stderr].concat();
+        (output.status.code(), String::from_utf8(said).unwrap())
+    };
+    let through = ["--bind", "room1=entrance", "--bind", "room2=corridor"];
+    let (code, said) = apply("changeRoom", &through);
+    assert!(code == Some(1) && said.contains("dormant"), "{said}");
+    assert_eq!(texts(&session.snapshot().unwrap(), "step", "rule"), [""; 0]);
+
+    // Woken by one process, it is used by the planner in another.
+    let (code, said) = apply("unlock", &[]);
+    assert_eq!(code, Some(0), "{said}");
+    let awake = |snapshot: &Snapshot| texts(snapshot, "grammar", "awake").concat();
+    assert_eq!(awake(&session.snapshot().unwrap()), "changeRoom ");
+    until(&mut session, "a plan with the woken rule", |snapshot| {
+        texts(snapshot, "step", "rule").contains(&"changeRoom".to_owned())
+            && texts(snapshot, "step", "status").contains(&"dispatched".to_owned())
+    });
+
+    // Loading rules anew puts nothing to sleep that was woken ...
+    fs::write(
+        file,
+        sleeping.replace("unlock : passive(1)", "unlock : passive(2)"),
+    )
+    .unwrap();
+    let loaded = Program::run(&["rules", "load", file, "--instance", name]);
+    assert_eq!(loaded.status.code(), Some(0), "{loaded:?}");
+    let rules = texts(&session.snapshot().unwrap(), "grammar", "rules").concat();
+    assert!(rules.contains("unlock : passive(2)"), "{rules}");
+    assert_eq!(awake(&session.snapshot().unwrap()), "changeRoom ");
+    // ... and taking its name out of the attribute does.
+    let asleep = Program::run(&["graph", "set", "grammar.awake", "", "--instance", name]);
+    assert_eq!(asleep.status.code(), Some(0), "{asleep:?}");
+    let (code, said) = apply("changeRoom", &through);
+    assert!(code == Some(1) && said.contains("dormant"), "{said}");
 }
