@@ -275,7 +275,7 @@ pub(crate) enum RulesAction {
     /// Tell everything that is wrong with a grammar and its includes, and where
     #[command(after_help = "Example:\n  cortex rules check scenarios/care-centre/rules.aggl")]
     Check {
-        /// A grammar (.aggl)
+        /// A grammar (.aggl), or a goal (.aggt)
         file: PathBuf,
         /// Also what does not fit this schema (TOML)
         #[arg(long, value_name = "S")]

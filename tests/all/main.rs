@@ -27,6 +27,7 @@ mod nowhere;
 mod path;
 mod plan;
 mod recording;
+mod robocomp_rules;
 mod rules;
 mod run;
 mod social;

@@ -2,10 +2,10 @@
 
 use crate::testing::{describe, graph};
 use crate::{
-    AttributePath, Binding, Comparison, Condition, Constant, Expression, Goal, Grammar, Literal,
-    Types, has_errors, parse_goal, parse_grammar,
+    AttributePath, Binding, Comparison, Condition, Constant, Expression, Goal, Grammar, Rule,
+    SourceFile, Types, has_errors, load_grammar, parse_goal,
 };
-use dsr::{EdgeRef, Graph, Time, Transaction, Value};
+use dsr::{EdgeRef, Graph, Snapshot, Time, Transaction, Value};
 use std::sync::Arc;
 
 const PAGE: &str = include_str!("../../../docs/src/aggl.md");
@@ -23,13 +23,20 @@ fn blocks() -> Vec<(&'static str, String)> {
     blocks
 }
 
+/// A grammar, which may include those that the page gives a name: ```` ```aggl file=NAME ````.
 fn grammar(text: &str) -> Grammar {
     let whole = if text.contains("\n===\n") {
         text.to_owned()
     } else {
         format!("name=example\n===\n{text}")
     };
-    let (grammar, diagnostics) = parse_grammar(&whole, "aggl.md");
+    let mut include = |path: &str, _: &str| {
+        let named = |words: &str| words.strip_prefix("aggl file=") == Some(path);
+        let file = blocks().into_iter().find(|(words, _)| named(words));
+        let (_, text) = file.ok_or("the page has no such file")?;
+        Ok(SourceFile::new(path, &text))
+    };
+    let (grammar, diagnostics) = load_grammar(&whole, "aggl.md", &mut include);
     assert!(!has_errors(&diagnostics), "{text}\n{diagnostics:?}");
     grammar
 }
@@ -74,12 +81,7 @@ fn world(text: &str) -> Graph {
         else {
             panic!("{condition}");
         };
-        let value: Value = match literal {
-            Literal::Integer(n) => (*n).into(),
-            Literal::Real(x) => (*x).into(),
-            Literal::Text(text) => text.as_str().into(),
-            Literal::Boolean(b) => (*b).into(),
-        };
+        let value: Value = literal.value();
         match path {
             AttributePath::Node {
                 variable,
@@ -102,6 +104,19 @@ fn world(text: &str) -> Graph {
     graph
 }
 
+/// What applying a rule comes to, beside the change.
+fn amounts(grammar: &Grammar, snapshot: &Snapshot, rule: &Rule, found: &Binding) -> String {
+    let cost = grammar.cost(snapshot, rule, found).unwrap();
+    let duration = grammar.duration(snapshot, rule, found).unwrap();
+    format!(
+        "{} cost {cost} duration {} success {} agent {}\n",
+        rule.kind,
+        duration.map_or("-".to_owned(), |seconds| seconds.to_string()),
+        rule.success,
+        rule.agent.as_deref().unwrap_or("-"),
+    )
+}
+
 #[test]
 fn every_example_of_the_reference_does_what_it_says() {
     let blocks = blocks();
@@ -109,6 +124,17 @@ fn every_example_of_the_reference_does_what_it_says() {
     for (index, (words, text)) in blocks.iter().enumerate() {
         if *words == "aggt" {
             goal(text);
+        }
+        if let "aggt holds" | "aggt unmet" = *words {
+            let before = blocks[..index]
+                .iter()
+                .rfind(|(words, _)| *words == "aggt before");
+            let snapshot = world(&before.unwrap().1).snapshot();
+            let met = Grammar::default()
+                .goal_holds(&snapshot, &goal(text))
+                .unwrap();
+            assert_eq!(met.is_some(), *words == "aggt holds", "{text}");
+            carried_out += 1;
         }
         if !words.starts_with("aggl") {
             continue;
@@ -134,6 +160,11 @@ fn every_example_of_the_reference_does_what_it_says() {
             continue;
         }
         let found = found.unwrap_or_else(|| panic!("no match: {text}")).unwrap();
+        if *then == "text amounts" {
+            assert_eq!(amounts(&grammar, &snapshot, rule, &found), *after, "{text}");
+            carried_out += 1;
+            continue;
+        }
         if *then == "aggt subgoal" {
             assert_eq!(
                 grammar.subgoal(&snapshot, rule, &found).unwrap(),
@@ -151,5 +182,5 @@ fn every_example_of_the_reference_does_what_it_says() {
         assert_eq!(describe(&graph), describe(&world(after)), "{text}");
         carried_out += 1;
     }
-    assert!(carried_out >= 14, "{carried_out} examples");
+    assert!(carried_out >= 21, "{carried_out} examples");
 }

@@ -39,12 +39,34 @@ fn check_manifest(
     Ok(grammar.check_manifest(schema, &manifest, &SourceFile::new(&name, &text)))
 }
 
+/// A goal by itself: nothing but its text is looked at.
+fn check_goal(file: &Path, as_json: bool) -> Result<Answer, Failure> {
+    let name = file.display().to_string();
+    let goal = grammar::parse_goal(&read_text(file)?, &name, &grammar::Types::default());
+    if as_json {
+        let diagnostics = match &goal {
+            Ok(_) => Vec::new(),
+            Err(defects) => diagnostics_json(&defects.diagnostics),
+        };
+        print_json(&json!({ "diagnostics": diagnostics, "conflicts": [], "conflicts_left": 0 }))?;
+    }
+    let goal = goal.map_err(|defects| Failure::Input(defects.into()))?;
+    if !as_json {
+        let (nodes, links) = (goal.pattern.nodes.len(), goal.pattern.edges.len());
+        print(&format!("{name}: a goal, {nodes} nodes, {links} links\n"))?;
+    }
+    Ok(Answer::Yes)
+}
+
 pub(super) fn check(
     file: &Path,
     beside: &Beside<'_>,
     conflicts: bool,
     as_json: bool,
 ) -> Result<Answer, Failure> {
+    if super::is_goal(file) {
+        return check_goal(file, as_json);
+    }
     let (grammar, mut diagnostics) = read(file)?;
     let schema = beside.schema.map(|path| {
         Schema::from_toml(&path.display().to_string(), &read_text(path)?)

@@ -65,7 +65,22 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     }
 }
 
+/// Whether a file is a goal by its name.
+fn is_goal(file: &Path) -> bool {
+    file.extension()
+        .is_some_and(|extension| extension == "aggt")
+}
+
 fn read(file: &Path) -> Result<(Grammar, Vec<Diagnostic>), Failure> {
+    if is_goal(file) {
+        let message = format!(
+            "{} is a goal, and a grammar (.aggl) is expected",
+            file.display()
+        );
+        let help =
+            "`cortex rules check` checks a goal, `cortex plan RULES WORLD GOAL` plans for it";
+        return Err(Failure::input_with_help(message, help));
+    }
     Ok(super::read_grammar(&super::read_text(file)?, file))
 }
 
