@@ -139,26 +139,34 @@ impl DensityField {
                 let count = SIDE.min(columns.1 - first);
                 let mut worst = [0.0; SIDE];
                 worst[..count].copy_from_slice(&self.worst[row * across + first..][..count]);
-                let (was, is) = (old.at_tiles(row, first), new.at_tiles(row, first));
-                let leaves: [bool; SIDE] = std::array::from_fn(|i| old.may_win(was[i], worst[i]));
-                let enters: [bool; SIDE] = std::array::from_fn(|i| new.may_win(is[i], worst[i]));
+                let (was, is) = (
+                    old.least_in_tiles(row, first),
+                    new.least_in_tiles(row, first),
+                );
+                let leaves: [bool; SIDE] = std::array::from_fn(|i| was[i] < worst[i]);
+                let enters: [bool; SIDE] = std::array::from_fn(|i| is[i] < worst[i]);
+                let is = new.at_tiles(row, first);
                 for i in 0..count {
                     let tile = first + i;
                     let cells = &mut self.tiles[row * across + tile];
                     if !(leaves[i] || enters[i]) {
                         continue;
                     }
-                    let before = *cells;
-                    if leaves[i] && old.give_way(&new, row, tile, cells) {
-                        let bound = new.most(is[i]).min(LIMIT.sqrt());
-                        open.push((row, tile, bound));
-                        around = around.joined(&one(row, tile));
-                        continue;
-                    }
-                    if !leaves[i] {
+                    let changed = if leaves[i] {
+                        let given = old.give_way(&new, row, tile, cells);
+                        if given.open {
+                            let bound = new.most(is[i]).min(LIMIT.sqrt());
+                            open.push((row, tile, bound));
+                            around = around.joined(&one(row, tile));
+                            continue;
+                        }
+                        given.changed
+                    } else {
+                        let before = *cells;
                         new.draw(row, tile, cells);
-                    }
-                    if differ(&before, cells) {
+                        differ(&before, cells)
+                    };
+                    if changed {
                         self.finish(row, tile);
                     }
                 }
@@ -188,10 +196,9 @@ impl DensityField {
             }
             for row in here.rows.0..here.rows.1 {
                 for first in (left..right).step_by(SIDE) {
-                    let at = kernel.at_tiles(row, first);
+                    let least = kernel.least_in_tiles(row, first);
                     let bounds = &bounds[(row - bottom) * stride + first - left..][..SIDE];
-                    let wins: [bool; SIDE] =
-                        std::array::from_fn(|i| kernel.may_win(at[i], bounds[i]));
+                    let wins: [bool; SIDE] = std::array::from_fn(|i| least[i] < bounds[i]);
                     for (tile, wins) in (first..).zip(wins) {
                         if wins && (here.columns.0..here.columns.1).contains(&tile) {
                             kernel.draw(row, tile, &mut self.tiles[row * across + tile]);
@@ -217,7 +224,10 @@ impl DensityField {
         for line in cells {
             most = std::array::from_fn(|i| greater(line[i], most[i]));
         }
-        self.worst[at] = most.into_iter().fold(0.0, greater).sqrt();
+        // By halves: one after the other, each would wait for the one before.
+        let most: [f32; 4] = std::array::from_fn(|i| greater(most[i], most[i + 4]));
+        let most = greater(greater(most[0], most[2]), greater(most[1], most[3]));
+        self.worst[at] = most.sqrt();
         let mut shown = [0.0; SIDE * SIDE];
         for (density, squared) in shown.iter_mut().zip(cells.as_flattened()) {
             *density = kernel::density(*squared);

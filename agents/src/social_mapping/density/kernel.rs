@@ -63,6 +63,15 @@ pub(super) struct Kernel {
     pub(super) tiles: Region,
 }
 
+/// What became of a tile when somebody left it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Given {
+    /// Whether there are cells of which it is not known whose they are.
+    pub(super) open: bool,
+    /// Whether any cell changed.
+    pub(super) changed: bool,
+}
+
 /// The squared deviation at which the density is [`super::LEAST_DENSITY`].
 pub(super) const LIMIT: f32 = 9.210_340_5;
 
@@ -154,30 +163,55 @@ impl Kernel {
     /// The squared deviation at so many cells from the person.
     #[inline(always)]
     fn squared(&self, x: f32, y: f32) -> f32 {
-        let along = x * self.ahead[0] + y * self.ahead[1];
-        let across = x * self.left[0] + y * self.left[1];
+        self.both(
+            x * self.ahead[0] + y * self.ahead[1],
+            x * self.left[0] + y * self.left[1],
+        )
+    }
+
+    /// The squared deviation of one ahead and one to the left.
+    #[inline(always)]
+    fn both(&self, along: f32, across: f32) -> f32 {
         // Of the two, one is not negative: without a branch, for vector units.
         let along = greater(along, along * self.turned[0]);
         let across = greater(across, across * self.turned[1]);
         along * along + across * across
     }
 
-    /// The squared deviations at `x` and each `step` further.
+    /// What the columns of a tile add to the deviations ahead and to the left: the same for each of its rows.
     #[inline(always)]
-    fn along(&self, x: f32, step: f32, y: f32) -> Lanes {
-        let mut squared = [0.0; SIDE];
-        for (squared, count) in squared.iter_mut().zip(STEPS) {
-            *squared = self.squared(x + count * step, y);
-        }
-        squared
+    fn columns(&self, tile: usize) -> [Lanes; 2] {
+        self.along(count(tile * SIDE) + (0.5 - self.centre[0]), 1.0)
     }
 
-    /// The squared deviations at the centres of the cells of a tile's row.
+    /// What `x` and each `step` further add to the deviations ahead and to the left.
     #[inline(always)]
-    fn row(&self, row: usize, tile: usize) -> Lanes {
-        let x = count(tile * SIDE) + (0.5 - self.centre[0]);
-        let y = count(row) + (0.5 - self.centre[1]);
-        self.along(x, 1.0, y)
+    fn along(&self, x: f32, step: f32) -> [Lanes; 2] {
+        let (mut ahead, mut left) = ([0.0; SIDE], [0.0; SIDE]);
+        for i in 0..SIDE {
+            let x = x + STEPS[i] * step;
+            ahead[i] = x * self.ahead[0];
+            left[i] = x * self.left[0];
+        }
+        [ahead, left]
+    }
+
+    /// The squared deviations at the centres of a row of the cells that have these columns: to the bit those of
+    /// [`Self::squared`].
+    #[inline(always)]
+    fn row(&self, row: usize, columns: &[Lanes; 2]) -> Lanes {
+        self.at(count(row) + (0.5 - self.centre[1]), columns)
+    }
+
+    /// The squared deviations at `y` and these columns.
+    #[inline(always)]
+    fn at(&self, y: f32, [ahead, left]: &[Lanes; 2]) -> Lanes {
+        let (y_ahead, y_left) = (y * self.ahead[1], y * self.left[1]);
+        let mut squared = [0.0; SIDE];
+        for i in 0..SIDE {
+            squared[i] = self.both(ahead[i] + y_ahead, left[i] + y_left);
+        }
+        squared
     }
 
     /// Where the centre of a tile lies, in cells from the person.
@@ -194,7 +228,35 @@ impl Kernel {
     #[inline(always)]
     pub(super) fn at_tiles(&self, row: usize, first: usize) -> Lanes {
         let [x, y] = self.place_of_tile(row, first);
-        self.along(x, SIDE as f32, y)
+        self.at(y, &self.along(x, SIDE as f32))
+    }
+
+    /// What the deviations in each of a row of tiles are not below.
+    ///
+    /// The deviation is a convex function of the place, so it lies above its tangent at the centre of a tile.
+    #[inline(always)]
+    pub(super) fn least_in_tiles(&self, row: usize, first: usize) -> Lanes {
+        let [x, y] = self.place_of_tile(row, first);
+        let [ahead, left] = self.along(x, SIDE as f32);
+        let (y_ahead, y_left) = (y * self.ahead[1], y * self.left[1]);
+        let mut least = [0.0; SIDE];
+        for i in 0..SIDE {
+            let (along, across) = (ahead[i] + y_ahead, left[i] + y_left);
+            let turned = [
+                if along > 0.0 { 1.0 } else { self.turned[0] },
+                if across > 0.0 { 1.0 } else { self.turned[1] },
+            ];
+            let (along, across) = (along * turned[0], across * turned[1]);
+            let deviation = (along * along + across * across).sqrt();
+            let (along, across) = (along * turned[0], across * turned[1]);
+            let slope_x = along * self.ahead[0] + across * self.left[0];
+            let slope_y = along * self.ahead[1] + across * self.left[1];
+            // Of no account at the person: there, the deviation is the least that there is.
+            let falls = CORNER * (slope_x.abs() + slope_y.abs()) / greater(deviation, 1e-6);
+            // More by what rounding may take.
+            least[i] = deviation - falls * 1.0001 - 1e-4;
+        }
+        least
     }
 
     /// The greatest deviation that it may have in a tile of which the centre has this squared one.
@@ -266,8 +328,9 @@ impl Kernel {
     /// Lowers the squared deviations in a tile to its own.
     #[inline(always)]
     pub(super) fn draw(&self, row: usize, tile: usize, cells: &mut Tile) {
+        let columns = self.columns(tile);
         for (at, cells) in cells.iter_mut().enumerate() {
-            let own = self.row(row * SIDE + at, tile);
+            let own = self.row(row * SIDE + at, &columns);
             for (cell, own) in cells.iter_mut().zip(own) {
                 *cell = less(own, *cell);
             }
@@ -275,15 +338,16 @@ impl Kernel {
     }
 
     /// Becomes `new` in a tile. The cells of which it may not be known whose they are without asking
-    /// everybody have what `new` leaves of the limit then; whether there are any.
+    /// everybody have what `new` leaves of the limit then.
     #[inline(always)]
-    pub(super) fn give_way(&self, new: &Self, row: usize, tile: usize, cells: &mut Tile) -> bool {
+    pub(super) fn give_way(&self, new: &Self, row: usize, tile: usize, cells: &mut Tile) -> Given {
         let limit = LIMIT.to_bits();
-        let mut gone = [0; SIDE];
+        let (mut gone, mut changed) = ([0; SIDE], [0; SIDE]);
+        let (old_columns, new_columns) = (self.columns(tile), new.columns(tile));
         for (at, cells) in cells.iter_mut().enumerate() {
             let (was, is) = (
-                self.row(row * SIDE + at, tile),
-                new.row(row * SIDE + at, tile),
+                self.row(row * SIDE + at, &old_columns),
+                new.row(row * SIDE + at, &new_columns),
             );
             for i in 0..SIDE {
                 // All ones where the cell was this person's, who leaves: as a choice, it would be a branch.
@@ -291,10 +355,16 @@ impl Kernel {
                 let leaves = u32::from(mine && is[i] > was[i]).wrapping_neg();
                 gone[i] |= leaves;
                 let others = (cells[i].to_bits() & !leaves) | (limit & leaves);
-                cells[i] = less(is[i], f32::from_bits(others));
+                let cell = less(is[i], f32::from_bits(others));
+                changed[i] |= cell.to_bits() ^ cells[i].to_bits();
+                cells[i] = cell;
             }
         }
-        gone.iter().any(|leaves| *leaves != 0)
+        let any = |bits: [u32; SIDE]| bits.into_iter().fold(0, |all, one| all | one) != 0;
+        Given {
+            open: any(gone),
+            changed: any(changed),
+        }
     }
 }
 
