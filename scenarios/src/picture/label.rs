@@ -41,6 +41,15 @@ impl Labels {
             .push([x - radius, y - radius, x + radius, y + radius]);
     }
 
+    /// Keeps words off a line, and so far to either side, px.
+    pub(super) fn keep_off_line(&mut self, from: Point2<f64>, to: Point2<f64>, half: f64) {
+        let pieces = ((to - from).norm() / (2.0 * half)).ceil().max(1.0) as usize;
+        for piece in 0..=pieces {
+            let share = piece as f64 / pieces as f64;
+            self.keep_off(from + (to - from) * share, half);
+        }
+    }
+
     /// Writes `content` centred on `centre` (px) or just above or below it.
     pub(super) fn centred(&mut self, centre: Point2<f64>, content: &str, look: Look) -> bool {
         let width = text_width(content, look.size);
@@ -146,5 +155,7 @@ mod tests {
         for (i, a) in labels.taken.iter().enumerate() {
             assert!(a[2] <= 400.0 && labels.taken[..i].iter().all(|b| !overlap(a, b)));
         }
+        labels.keep_off_line(Point2::new(20.0, 50.0), Point2::new(380.0, 60.0), 5.0);
+        assert!(!labels.at(Point2::new(290.0, 57.5), "on it", look));
     }
 }

@@ -29,7 +29,7 @@ const OUTLINE: usize = 72;
 const BANDS: u32 = 9;
 /// Groups: Okabe and Ito's reddish purple.
 const GROUP: &str = "#aa3377";
-/// Half the width of what is kept free of words around the head of an arrow, px.
+/// Half the width of what is kept free of words along an arrow, px.
 const ARROW: f64 = 5.0;
 /// With more people than this, nobody is named.
 const NAMED: usize = 40;
@@ -357,8 +357,8 @@ fn people(view: &View, update: &Update, situation: &Situation, labels: &mut Labe
     let mut group = Group::new();
     for found in update.groups.iter() {
         let pose = &found.entity.world_from_group;
-        labels.keep_off(view.page(pose.translation.vector.into()), 5.0);
-        labels.keep_off(view.page(ahead_of_group(pose)), ARROW);
+        let (centre, ahead) = (pose.translation.vector.into(), ahead_of_group(pose));
+        labels.keep_off_line(view.page(centre), view.page(ahead), ARROW);
     }
     for person in spaces {
         let radius = situation
@@ -381,7 +381,7 @@ fn people(view: &View, update: &Update, situation: &Situation, labels: &mut Labe
                 .set("fill", INK),
         );
         labels.keep_off(view.page(centre), view.px(radius));
-        labels.keep_off(view.page(ahead), ARROW);
+        labels.keep_off_line(view.page(centre), view.page(ahead), ARROW);
     }
     if spaces.len() <= NAMED {
         for person in spaces {

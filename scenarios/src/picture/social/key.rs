@@ -96,6 +96,7 @@ pub(super) fn column(
             .set("stroke", "#0b2f5b")
             .set("stroke-width", width)
             .set("stroke-dasharray", dashes);
+        let level = (level * 1e4).round() / 1e4;
         let name = format!("{name}, density {level}");
         column = column.add(stroke).add(words(40.0, y, &name, INK));
         y += LINE;
