@@ -39,17 +39,61 @@ const SCHEMA_SUBTYPES: [(&str, &[&str]); 3] = [
     ("tool", &["pot"]),
 ];
 
+/// Texts that attributes have and rules ask for.
+pub(crate) const TEXTS: &[&str] = &["x", "y"];
+
 pub(crate) type LinkKey = (String, String, String);
 /// Variables and the names of their nodes.
 pub(crate) type Assignment = BTreeMap<String, String>;
+
+/// The value of an attribute. Numbers are one kind here: whole ones and others compare as reals.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Datum {
+    Number(f64),
+    Text(String),
+    Truth(bool),
+}
+
+impl Datum {
+    fn strategy() -> impl Strategy<Value = Self> {
+        prop_oneof![
+            6 => (-2..5_i32).prop_map(|number| Self::Number(number.into())),
+            1 => prop::sample::select(TEXTS).prop_map(|text| Self::Text(text.to_owned())),
+            1 => any::<bool>().prop_map(Self::Truth),
+        ]
+    }
+
+    fn number(&self) -> Option<f64> {
+        match self {
+            Self::Number(number) => Some(*number),
+            Self::Text(_) | Self::Truth(_) => None,
+        }
+    }
+
+    fn to_value(&self) -> Value {
+        match self {
+            Self::Number(number) => (*number as i64).into(),
+            Self::Text(text) => text.as_str().into(),
+            Self::Truth(truth) => (*truth).into(),
+        }
+    }
+
+    fn of_value(value: &Value) -> Self {
+        match value {
+            Value::String(text) => Self::Text(text.clone()),
+            Value::Bool(truth) => Self::Truth(*truth),
+            number => Self::Number(number.as_f64().unwrap()),
+        }
+    }
+}
 
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Model {
     pub(crate) nodes: BTreeMap<String, String>,
     pub(crate) links: BTreeSet<LinkKey>,
     /// Attributes of nodes.
-    pub(crate) values: BTreeMap<(String, String), f64>,
-    pub(crate) link_values: BTreeMap<(LinkKey, String), f64>,
+    pub(crate) values: BTreeMap<(String, String), Datum>,
+    pub(crate) link_values: BTreeMap<(LinkKey, String), Datum>,
 }
 
 fn is_a(type_name: &str, general: &str) -> bool {
@@ -65,8 +109,8 @@ impl Model {
     pub(crate) fn strategy() -> impl Strategy<Value = Self> {
         let types = prop::collection::vec(0..NODE_TYPES.len(), 0..6);
         let ends = || (0..6_usize, 0..2_usize, 0..6_usize);
-        let links = prop::collection::vec((ends(), prop::option::of(-2..5_i32)), 0..14);
-        let values = prop::collection::vec((0..6_usize, 0..2_usize, -2..5_i32), 0..8);
+        let links = prop::collection::vec((ends(), prop::option::of(Datum::strategy())), 0..14);
+        let values = prop::collection::vec((0..6_usize, 0..2_usize, Datum::strategy()), 0..8);
         (types, links, values).prop_map(|(types, links, values)| {
             let mut model = Self::default();
             let node = |index: usize| format!("node{index}");
@@ -80,9 +124,7 @@ impl Model {
                 if from < types.len() && to < types.len() {
                     let key = (node(from), label, node(to));
                     if let Some(value) = value {
-                        model
-                            .link_values
-                            .insert((key.clone(), "n".into()), value.into());
+                        model.link_values.insert((key.clone(), "n".into()), value);
                     }
                     model.links.insert(key);
                 }
@@ -90,7 +132,7 @@ impl Model {
             for (index, attribute, value) in values {
                 if index < types.len() {
                     let attribute = ["n", "m"][attribute].to_owned();
-                    model.values.insert((node(index), attribute), value.into());
+                    model.values.insert((node(index), attribute), value);
                 }
             }
             model
@@ -107,11 +149,11 @@ impl Model {
             transaction.create_edge(from.as_str(), label, to.as_str());
         }
         for ((node, attribute), value) in &self.values {
-            transaction.set(node.as_str(), attribute, *value as i64);
+            transaction.set(node.as_str(), attribute, value.to_value());
         }
         for (((from, label, to), attribute), value) in &self.link_values {
             let edge = dsr::EdgeRef::new(from.as_str(), label, to.as_str());
-            transaction.set_on_edge(edge, attribute, *value as i64);
+            transaction.set_on_edge(edge, attribute, value.to_value());
         }
         graph.commit(&transaction, "test", Time::default()).unwrap();
         graph
@@ -120,7 +162,6 @@ impl Model {
     pub(crate) fn of_graph(graph: &Graph) -> Self {
         let snapshot = graph.snapshot();
         let schema = snapshot.schema();
-        let number = |value: Value| value.as_f64().unwrap();
         let name = |id| snapshot.find_node(id).unwrap().unwrap().name().unwrap();
         let mut model = Self::default();
         for node in snapshot.nodes() {
@@ -130,7 +171,7 @@ impl Model {
                 let key = schema.attribute_name(attribute.name).to_owned();
                 model
                     .values
-                    .insert((this.clone(), key), number(attribute.value));
+                    .insert((this.clone(), key), Datum::of_value(&attribute.value));
             }
             for key in node.out_edges() {
                 let key = key.unwrap();
@@ -149,7 +190,7 @@ impl Model {
                     let key = schema.attribute_name(attribute.name).to_owned();
                     model
                         .link_values
-                        .insert((link.clone(), key), number(attribute.value));
+                        .insert((link.clone(), key), Datum::of_value(&attribute.value));
                 }
                 model.links.insert(link);
             }
@@ -235,13 +276,17 @@ impl Model {
                 else {
                     return false;
                 };
+                let ordered = |holds: fn(&f64, &f64) -> bool| {
+                    let both = left.number().zip(right.number());
+                    both.is_some_and(|(left, right)| holds(&left, &right))
+                };
                 match operator {
                     Comparison::Equal => left == right,
                     Comparison::NotEqual => left != right,
-                    Comparison::Less => left < right,
-                    Comparison::LessOrEqual => left <= right,
-                    Comparison::Greater => left > right,
-                    Comparison::GreaterOrEqual => left >= right,
+                    Comparison::Less => ordered(f64::lt),
+                    Comparison::LessOrEqual => ordered(f64::le),
+                    Comparison::Greater => ordered(f64::gt),
+                    Comparison::GreaterOrEqual => ordered(f64::ge),
                 }
             }
             Condition::Not(inner) => !self.holds(inner, at),
@@ -262,17 +307,21 @@ impl Model {
         }
     }
 
-    fn value(&self, expression: &Expression, at: &Assignment) -> Option<f64> {
+    fn value(&self, expression: &Expression, at: &Assignment) -> Option<Datum> {
         match expression {
-            Expression::Literal(Literal::Integer(value)) => Some(*value as f64),
-            Expression::Literal(_) => unreachable!("few words have whole numbers only"),
+            Expression::Literal(literal) => Some(match literal {
+                Literal::Integer(value) => Datum::Number(*value as f64),
+                Literal::Real(value) => Datum::Number(*value),
+                Literal::Text(text) => Datum::Text(text.clone()),
+                Literal::Boolean(truth) => Datum::Truth(*truth),
+            }),
             Expression::Attribute(AttributePath::Node {
                 variable,
                 attribute,
             }) => self
                 .values
                 .get(&(at[&**variable].clone(), attribute.to_string()))
-                .copied(),
+                .cloned(),
             Expression::Attribute(AttributePath::Edge {
                 from,
                 label,
@@ -282,14 +331,14 @@ impl Model {
                 let link = (at[&**from].clone(), label.to_string(), at[&**to].clone());
                 self.link_values
                     .get(&(link, attribute.to_string()))
-                    .copied()
+                    .cloned()
             }
             Expression::Arithmetic { operator, operands } => {
                 let values: Option<Vec<f64>> = operands
                     .iter()
-                    .map(|operand| self.value(operand, at))
+                    .map(|operand| self.value(operand, at)?.number())
                     .collect();
-                match (&values?[..], operator) {
+                let result = match (&values?[..], operator) {
                     ([only], _) => Some(-only),
                     (all, Arithmetic::Add) => Some(all.iter().sum()),
                     (all, Arithmetic::Multiply) => Some(all.iter().product()),
@@ -300,7 +349,8 @@ impl Model {
                         .iter()
                         .try_fold(*first, |sum, next| (*next != 0.0).then(|| sum / next)),
                     ([], _) => None,
-                }
+                };
+                result.map(Datum::Number)
             }
         }
     }

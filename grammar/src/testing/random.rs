@@ -1,5 +1,6 @@
 //! Strategies: random rules, goals and whole grammars, and random small graphs.
 
+use super::oracle::TEXTS;
 use crate::{
     Arithmetic, AttributePath, Combo, ComboStep, ComboVariable, Comparison, Condition, Effect,
     Expression, Grammar, Include, Kind, Literal, Name, Pattern, PatternEdge, PatternNode, Property,
@@ -17,7 +18,7 @@ pub(crate) struct Words {
     pub(crate) types: &'static [&'static str],
     pub(crate) labels: &'static [&'static str],
     pub(crate) attributes: &'static [&'static str],
-    /// Literals of all kinds, or small whole numbers only.
+    /// Literals of all kinds, or small whole numbers, two texts and truth values only.
     pub(crate) any_literal: bool,
 }
 
@@ -94,7 +95,12 @@ impl Words {
 
     fn literal(self) -> impl Strategy<Value = Literal> {
         if !self.any_literal {
-            return (-2..5_i64).prop_map(Literal::Integer).boxed();
+            return prop_oneof![
+                6 => (-2..5_i64).prop_map(Literal::Integer),
+                1 => select(TEXTS).prop_map(|text| Literal::Text(text.to_owned())),
+                1 => any::<bool>().prop_map(Literal::Boolean),
+            ]
+            .boxed();
         }
         prop_oneof![
             any::<i64>().prop_map(Literal::Integer),

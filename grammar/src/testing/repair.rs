@@ -1,7 +1,8 @@
 //! Makes random rules well-formed: every variable is bound where it is used.
 
 use crate::{
-    AttributePath, Condition, Effect, Expression, Name, Pattern, PatternEdge, PatternNode, Rule,
+    AttributePath, Comparison, Condition, Effect, Expression, Literal, Name, Pattern, PatternEdge,
+    PatternNode, Rule,
 };
 
 /// The rule with unknown variables replaced by known ones, second declarations dropped, and
@@ -100,9 +101,17 @@ fn condition(formula: &mut Condition, scope: &mut Vec<Name>, fresh: &mut usize) 
             bind(from, scope);
             bind(to, scope);
         }
-        Condition::Compare { left, right, .. } => {
-            expression(left, scope);
-            expression(right, scope);
+        Condition::Compare {
+            operator,
+            left,
+            right,
+        } => {
+            for side in [left, right] {
+                expression(side, scope);
+                if !matches!(operator, Comparison::Equal | Comparison::NotEqual) {
+                    numeric(side);
+                }
+            }
         }
         Condition::Not(inner) => condition(inner, scope, fresh),
         Condition::And(all) | Condition::Or(all) => {
@@ -133,8 +142,16 @@ fn expression(formula: &mut Expression, scope: &[Name]) {
         Expression::Arithmetic { operands, .. } => {
             for operand in operands {
                 expression(operand, scope);
+                numeric(operand);
             }
         }
+    }
+}
+
+/// Where only numbers can stand: a number in place of another constant.
+fn numeric(formula: &mut Expression) {
+    if matches!(formula, Expression::Literal(_)) && formula.as_number().is_none() {
+        *formula = Expression::Literal(Literal::Integer(1));
     }
 }
 

@@ -4,7 +4,10 @@ use super::unfold;
 use crate::testing::oracle::{Assignment, Model, TYPES};
 use crate::testing::random::FEW;
 use crate::testing::repair::repaired;
-use crate::{Combo, ComboStep, ComboVariable, Grammar, Kind, Name, Rule, Unfolded, parse_grammar};
+use crate::{
+    Binding, Combo, ComboStep, ComboVariable, Grammar, Kind, Name, PatternEdge, Rule, Unfolded,
+    parse_grammar,
+};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 
@@ -147,13 +150,13 @@ fn canonical(before: &Model, after: &Model) -> Vec<Vec<String>> {
             after
                 .values
                 .iter()
-                .map(|((n, a), v)| format!("{}.{a}={v}", name(n))),
+                .map(|((n, a), v)| format!("{}.{a}={v:?}", name(n))),
         );
         lines.extend(
             after
                 .link_values
                 .iter()
-                .map(|(((f, l, t), a), v)| format!("{}-{l}>{}.{a}={v}", name(f), name(t))),
+                .map(|(((f, l, t), a), v)| format!("{}-{l}>{}.{a}={v:?}", name(f), name(t))),
         );
         lines.sort();
         texts.push(lines);
@@ -205,6 +208,80 @@ proptest! {
                         "{} at {:?} of {}\n{:?}", whole.rule, at, grammar, model
                     );
                 }
+            }
+        }
+    }
+}
+
+/// The rule with what the goal of a hierarchical one asks for as its left side, read off the rule itself.
+fn aimed_at(rule: &Rule) -> Rule {
+    let mut aim = rule.clone();
+    let kept = |name: &Name| {
+        let only_left = rule.left.node(name).is_some() && rule.right.node(name).is_none();
+        !only_left
+    };
+    aim.left = rule.right.clone();
+    aim.parameters.retain(|node| kept(&node.variable));
+    for edge in &rule.left.edges {
+        let again = rule.right.edge(&edge.from, &edge.label, &edge.to).is_some();
+        if !edge.negated && !again && kept(&edge.from) && kept(&edge.to) {
+            aim.left.edges.push(PatternEdge {
+                negated: true,
+                ..edge.clone()
+            });
+        }
+    }
+    // A node that changes its type has the new one in the end.
+    aim.parameters
+        .retain(|node| rule.right.node(&node.variable).is_none());
+    aim.precondition = None;
+    let known: Vec<Name> = aim
+        .bound_nodes()
+        .map(|node| node.variable.clone())
+        .collect();
+    let known = |edge: &PatternEdge| known.contains(&edge.from) && known.contains(&edge.to);
+    aim.left.edges.retain(known);
+    aim
+}
+
+proptest! {
+    #![proptest_config(crate::testing::cases(300))]
+
+    #[test]
+    fn a_hierarchical_rule_aims_at_what_it_would_bring_about(
+        rule in FEW.rule(),
+        model in Model::strategy(),
+    ) {
+        let mut rule = repaired(rule);
+        rule.hierarchical = true;
+        rule.effect.clear();
+        let (mut grammar, _) = parse_grammar(TYPES, "types.aggl");
+        grammar.rules.push(rule.clone());
+        let aim = aimed_at(&rule);
+        let graph = model.to_graph();
+        let snapshot = graph.snapshot();
+        let matches = grammar.matches(&snapshot, &rule, &Binding::new()).unwrap();
+        for found in matches.take(4) {
+            let found = found.unwrap();
+            let name = |id| snapshot.find_node(id).unwrap().unwrap().name().unwrap();
+            let named: Assignment =
+                found.iter().map(|(variable, id)| (variable.to_string(), name(id))).collect();
+            let goal = grammar.subgoal(&snapshot, &rule, &found).unwrap();
+            // It is met now where the nodes that are kept, and any for those that are made, are as wanted.
+            let same = |at: &Assignment| {
+                at.iter().all(|(variable, node)| named.get(variable).is_none_or(|n| n == node))
+            };
+            let mut all = model.assignments(&aim).into_iter();
+            let expected = all.any(|at| same(&at) && model.rule_holds(&aim, &at));
+            let met = grammar.goal_holds(&snapshot, &goal).unwrap().is_some();
+            prop_assert_eq!(met, expected, "{}{}", rule, goal);
+            // It is met once the rule was applied.
+            if let Ok(operations) = grammar.apply(&snapshot, &rule.name, &found) {
+                let mut after = model.to_graph();
+                let change = dsr::Transaction { operations, ..dsr::Transaction::new() };
+                after.commit(&change, "test", dsr::Time::default()).unwrap();
+                let met = grammar.goal_holds(&after.snapshot(), &goal).unwrap();
+                prop_assert!(met.is_some(), "{rule}{goal}");
             }
         }
     }

@@ -1,6 +1,6 @@
 //! What a rule changes, naively: everything it says is collected, then done at once.
 
-use super::{Assignment, LinkKey, Model, SCHEMA_SUBTYPES};
+use super::{Assignment, Datum, LinkKey, Model, SCHEMA_SUBTYPES};
 use crate::{AttributePath, Effect, Rule};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -147,10 +147,10 @@ impl Model {
             model.nodes.insert(node.clone(), type_name.clone());
         }
         for (key, value) in &plan.assigned {
-            model.values.insert(key.clone(), *value);
+            model.values.insert(key.clone(), value.clone());
         }
         for (key, value) in &plan.link_assigned {
-            model.link_values.insert(key.clone(), *value);
+            model.link_values.insert(key.clone(), value.clone());
         }
         for node in &plan.deleted {
             model.nodes.remove(node);
@@ -187,8 +187,8 @@ struct Plan {
     unwanted: BTreeSet<LinkKey>,
     /// Links that effects unlink by name.
     said: BTreeSet<LinkKey>,
-    assigned: BTreeMap<(String, String), f64>,
-    link_assigned: BTreeMap<(LinkKey, String), f64>,
+    assigned: BTreeMap<(String, String), Datum>,
+    link_assigned: BTreeMap<(LinkKey, String), Datum>,
 }
 
 impl Plan {
