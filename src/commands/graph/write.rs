@@ -53,10 +53,11 @@ pub(crate) fn transaction(
 }
 
 /// A value as it is written on the command line: JSON, and a bare word is a text, so that a shell
-/// needs no quotes within quotes.
+/// needs no quotes within quotes. Of a text, JSON is the text itself: settings are written as such.
 fn parse(text: &str, kind: Option<ValueKind>) -> Result<Value, String> {
     let json: Json = serde_json::from_str(text).unwrap_or_else(|_| text.into());
-    if kind == Some(ValueKind::String) && !json.is_string() && !json.is_object() {
+    let names = |json: &Json| json.get("type").is_some() && json.get("value").is_some();
+    if kind == Some(ValueKind::String) && !json.is_string() && !names(&json) {
         return Ok(text.into());
     }
     json::value_from_json(&json, kind)
@@ -75,6 +76,16 @@ mod tests {
             ("4", Some(ValueKind::String), "4".into()),
             ("\"4\"", Some(ValueKind::String), "4".into()),
             ("true", Some(ValueKind::String), "true".into()),
+            (
+                r#"{"usage": "steps"}"#,
+                Some(ValueKind::String),
+                r#"{"usage": "steps"}"#.into(),
+            ),
+            (
+                r#"{"type": "string", "value": "x"}"#,
+                Some(ValueKind::String),
+                "x".into(),
+            ),
             ("true", None, Value::Bool(true)),
             ("going", None, "going".into()),
             ("7", Some(ValueKind::U64), Value::U64(7)),
