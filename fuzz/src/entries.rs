@@ -335,7 +335,12 @@ pub fn arena(bytes: &[u8]) {
 
 /// A graph with something of everything in it.
 pub fn small_graph() -> Graph {
-    let mut graph = Graph::in_memory(Schema::open());
+    // Types that descend from others in many ways, so that damage makes more of it.
+    let step = |i: u32| format!("a{i} = ['a{0}', 'b{0}']\nb{i} = ['a{0}', 'b{0}']\n", i - 1);
+    let steps: String = (1..24).map(step).collect();
+    let schema = format!("open = true\n[types]\nthing = []\na0 = ['thing']\nb0 = []\n{steps}");
+    let schema = Schema::from_toml("small", &schema).expect("a schema");
+    let mut graph = Graph::in_memory(schema);
     for i in 0..70u64 {
         let mut transaction = Transaction::new();
         let attributes = vec![

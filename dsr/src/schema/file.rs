@@ -1,9 +1,11 @@
 //! Schema files: TOML with the tables `types`, `labels` and `attributes`. This file guarantees
 //! that every name a schema file uses is defined in it, and points at the one that is not.
 
-use super::{AttributeType, Schema, SchemaError, suggest};
+use super::{AttributeType, NodeType, Schema, SchemaError, suggest};
 use crate::{LargeType, NumberKind, TypeId, ValueKind};
 use miette::{Diagnostic, NamedSource, SourceSpan};
+use petgraph::algo::toposort;
+use petgraph::graph::DiGraph;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -172,22 +174,14 @@ impl Schema {
                 })
                 .collect()
         };
-        for (index, (name, parents)) in file.types.iter().enumerate() {
-            let parents = look_up(&schema, parents)?;
-            schema.parts.types[index].parents = parents;
-            if schema.parts.types[index].parents.iter().any(|&parent| {
-                super::descends(
-                    &schema.parts.types,
-                    usize::from(parent.0),
-                    index,
-                    names.len(),
-                )
-            }) {
-                let message = format!("`{}` is its own ancestor", name.get_ref());
-                return Err(error(message, Some(name.span()), None));
-            }
+        for (index, parents) in file.types.values().enumerate() {
+            schema.parts.types[index].parents = look_up(&schema, parents)?;
         }
         schema.index_subtypes();
+        if let Some(name) = in_a_circle(schema.types()).and_then(|at| file.types.keys().nth(at)) {
+            let message = format!("`{}` is its own ancestor", name.get_ref());
+            return Err(error(message, Some(name.span()), None));
+        }
         for (name, ends) in &file.labels {
             let (from, to) = (look_up(&schema, &ends.from)?, look_up(&schema, &ends.to)?);
             schema
@@ -235,6 +229,16 @@ impl Schema {
         }
         Ok(schema)
     }
+}
+
+/// The place of a type that descends from itself.
+fn in_a_circle(types: &[NodeType]) -> Option<usize> {
+    let steps = (0..).zip(types).flat_map(|(child, of): (u32, _)| {
+        let parents = of.parents.iter();
+        parents.map(move |parent| (child, u32::from(parent.0)))
+    });
+    let order = toposort(&DiGraph::<(), ()>::from_edges(steps), None);
+    order.err().map(|circle| circle.node_id().index())
 }
 
 #[cfg(test)]

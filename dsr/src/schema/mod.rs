@@ -9,8 +9,9 @@ pub use error::{NameKind, SchemaError, suggest};
 pub use file::SchemaFileError;
 
 use crate::{AttributeId, LabelId, LargeType, TypeId, Value, ValueKind};
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 use serde::{Deserialize, Serialize};
+use std::sync::OnceLock;
 
 /// A node type.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -63,8 +64,9 @@ pub struct Schema {
     type_ids: FxHashMap<String, TypeId>,
     label_ids: FxHashMap<String, LabelId>,
     attribute_ids: FxHashMap<String, AttributeId>,
-    /// For each type, itself and all its subtypes by id.
-    subtypes: Vec<Vec<TypeId>>,
+    /// For each type, itself and all its subtypes by id, once somebody asks for them: all together may
+    /// take room and time that no schema is worth.
+    subtypes: Vec<OnceLock<Box<[TypeId]>>>,
     has_hot: bool,
 }
 
@@ -216,9 +218,10 @@ impl Schema {
 
     /// The type itself and all its subtypes, by id.
     pub fn subtypes(&self, general: TypeId) -> &[TypeId] {
-        self.subtypes
-            .get(usize::from(general.0))
-            .map_or(&[], Vec::as_slice)
+        let known = self.subtypes.get(usize::from(general.0));
+        known.map_or(&[], |known| {
+            known.get_or_init(|| subtypes(&self.parts.types, general))
+        })
     }
 
     /// The type of that name.
@@ -382,27 +385,29 @@ impl Schema {
     }
 
     fn index_subtypes(&mut self) {
-        let types = &self.parts.types;
-        self.subtypes = (0..types.len())
-            .map(|general| {
-                (0..types.len())
-                    .filter(|&special| descends(types, special, general, types.len()))
-                    .map(|special| TypeId(special as u16))
-                    .collect()
-            })
-            .collect();
+        self.subtypes.clear();
+        let count = self.parts.types.len();
+        self.subtypes.resize_with(count, OnceLock::new);
     }
 }
 
-/// Whether type `special` is `general` or descends from it within `depth` steps.
-fn descends(types: &[NodeType], special: usize, general: usize, depth: usize) -> bool {
-    special == general
-        || depth > 0
-            && types.get(special).is_some_and(|t| {
-                t.parents
-                    .iter()
-                    .any(|p| descends(types, usize::from(p.0), general, depth - 1))
-            })
+/// The type and all that descend from it, by id, also where types descend from each other in a circle.
+fn subtypes(types: &[NodeType], general: TypeId) -> Box<[TypeId]> {
+    let mut children: FxHashMap<TypeId, Vec<TypeId>> = FxHashMap::default();
+    for (id, child) in (0..).map(TypeId).zip(types) {
+        for &parent in &child.parents {
+            children.entry(parent).or_default().push(id);
+        }
+    }
+    let mut found = FxHashSet::from_iter([general]);
+    let mut open = vec![general];
+    while let Some(next) = open.pop() {
+        let children = children.get(&next).map_or(&[][..], Vec::as_slice);
+        open.extend(children.iter().filter(|&&child| found.insert(child)));
+    }
+    let mut found: Vec<TypeId> = found.into_iter().collect();
+    found.sort_unstable();
+    found.into_boxed_slice()
 }
 
 fn next_id(name: &str, count: usize) -> Result<u16, SchemaError> {
@@ -444,6 +449,30 @@ mod tests {
         assert!(schema.is_subtype(table, thing));
         assert!(!schema.is_subtype(table, room));
         assert!(!schema.is_subtype(thing, table));
+    }
+
+    #[test]
+    fn a_type_with_very_many_ways_to_its_ancestors_is_nothing_special() {
+        let step = |i: u32| format!("a{i} = ['a{0}', 'b{0}']\nb{i} = ['a{0}', 'b{0}']\n", i - 1);
+        let steps: String = (1..60).map(step).collect();
+        let text = format!("[types]\na0 = []\nb0 = []\n{steps}");
+        let schema = Schema::from_toml("ladder", &text).unwrap();
+        let [top, bottom] = ["a0", "b59"].map(|name| schema.type_id(name).unwrap());
+        assert!(schema.is_subtype(bottom, top));
+        assert_eq!(schema.subtypes(top).len(), 119);
+    }
+
+    #[test]
+    fn types_that_another_process_made_descend_from_each_other_do_no_harm() {
+        let mut parts = schema().parts;
+        let thing = parts.types.iter().position(|t| t.name == "thing").unwrap();
+        let all = (0..parts.types.len() as u16).map(TypeId);
+        parts.types[thing].parents = all.chain([TypeId(77)]).collect();
+        let schema = Schema::from(parts);
+        let thing = TypeId(thing as u16);
+        assert_eq!(schema.subtypes(thing).len(), 4);
+        assert!(schema.is_subtype(thing, schema.type_id("table").unwrap()));
+        assert!(schema.subtypes(TypeId(77)).is_empty());
     }
 
     #[test]
