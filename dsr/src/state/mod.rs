@@ -10,6 +10,7 @@ pub(crate) use keeper::Keeper;
 
 use crate::graph::{EdgeImage, Frame, Image, NodeImage};
 use crate::{EdgeKey, LabelId, NodeId, ReadError, Schema, Snapshot, Version};
+use redb::backends::FileBackend;
 use redb::{
     Database, DatabaseError, ReadableDatabase, ReadableTable, StorageError, TableDefinition,
     TableError,
@@ -20,7 +21,7 @@ use serde::de::DeserializeOwned;
 use std::collections::BTreeSet;
 use std::fs;
 use std::io;
-use std::os::unix::fs::DirBuilderExt;
+use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -30,6 +31,8 @@ const FORMAT: u32 = 2;
 const FILE: &str = "graph.redb";
 /// The name of one that is being made.
 const UNFINISHED: &str = "graph.redb.new";
+/// The mode of the database: what a robot knows of people is for its owner alone.
+const OF_OWNER: u32 = 0o600;
 /// Memory that the database may keep pages in.
 const CACHE_BYTES: usize = 16 << 20;
 /// A file that is smaller than this is not worth making smaller.
@@ -66,6 +69,14 @@ pub enum StateError {
     /// The folder holds something else.
     #[error("{path} is not a state folder of cortex; give --state an empty or a new folder")]
     Foreign {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// Other users may put another file in the place of the database.
+    #[error(
+        "others than its owner can write to {path}; `chmod go-w` it, or give --state another folder"
+    )]
+    Shared {
         /// The folder.
         path: PathBuf,
     },
@@ -166,7 +177,6 @@ impl State {
             source,
         };
         let path = folder.join(FILE);
-        // What a robot knows of people is for its owner alone.
         let made = fs::DirBuilder::new()
             .recursive(true)
             .mode(0o700)
@@ -175,10 +185,16 @@ impl State {
         let lock = fs::File::open(folder).map_err(failed)?;
         let operation = FlockOperation::NonBlockingLockExclusive;
         flock(&lock, operation).map_err(|_| StateError::InUse { path: path.clone() })?;
+        if lock.metadata().map_err(failed)?.permissions().mode() & 0o022 != 0 {
+            let path = folder.to_owned();
+            return Err(StateError::Shared { path });
+        }
         if !path.try_exists().map_err(failed)? {
             create(folder, &path)?;
             lock.sync_all().map_err(failed)?;
         }
+        // Where it was copied to, others may read it.
+        fs::set_permissions(&path, fs::Permissions::from_mode(OF_OWNER)).map_err(failed)?;
         let database = Database::builder()
             .set_cache_size(CACHE_BYTES)
             .set_check_integrity_on_open(true)
@@ -419,7 +435,13 @@ fn create(folder: &Path, path: &Path) -> Result<(), StateError> {
         _ => {}
     }
     let make = || -> Result<(), redb::Error> {
-        let database = Database::create(&unfinished)?;
+        let file = fs::File::options()
+            .read(true)
+            .write(true)
+            .create_new(true)
+            .mode(OF_OWNER)
+            .open(&unfinished)?;
+        let database = Database::builder().create_with_backend(FileBackend::new(file)?)?;
         let write = database.begin_write()?;
         let format = postcard::to_stdvec(&FORMAT).unwrap_or_default();
         write

@@ -236,13 +236,24 @@ fn an_older_graph_does_not_replace_a_newer_one() {
 }
 
 #[test]
-fn only_its_owner_can_enter_a_new_folder() {
+fn nobody_but_its_owner_reads_or_writes_a_state() {
     use std::os::unix::fs::PermissionsExt;
     let parent = TempDir::new().unwrap();
+    let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
+    let set = |path: &Path, mode| fs::set_permissions(path, fs::Permissions::from_mode(mode));
     let folder = parent.path().join("a/b");
+    let file = folder.join("graph.redb");
     State::open(&folder).unwrap();
-    let mode = fs::metadata(&folder).unwrap().permissions().mode();
-    assert_eq!(mode & 0o777, 0o700);
+    assert_eq!((mode(&folder), mode(&file)), (0o700, 0o600));
+    // A folder that was there before, and a database that was copied to it.
+    set(&folder, 0o755).unwrap();
+    set(&file, 0o644).unwrap();
+    State::open(&folder).unwrap();
+    assert_eq!((mode(&folder), mode(&file)), (0o755, 0o600));
+    set(&folder, 0o775).unwrap();
+    let error = State::open(&folder).unwrap_err();
+    assert!(matches!(error, StateError::Shared { .. }), "{error}");
+    assert!(error.to_string().contains("chmod go-w"), "{error}");
 }
 
 #[test]
