@@ -6,6 +6,7 @@ use crate::{Answer, Failure};
 use dsr::Instance;
 use serde_json::{Value, json};
 use std::fs;
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
 
 /// Where the graph lies.
 const SHARED_MEMORY: &str = "/dev/shm";
@@ -45,6 +46,7 @@ impl Finding {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     let mut findings = vec![shared_memory()?, open_files(), kernel()];
+    findings.extend(runtime_folder()?);
     for instance in Instance::all().map_err(Failure::internal)? {
         findings.push(look_at(&instance, arguments.mend)?);
     }
@@ -109,6 +111,25 @@ fn kernel() -> Finding {
         format!("Linux {}", release.trim()),
         old.then_some(mend),
     )
+}
+
+/// Looks whether the folder of all instances is one that a store will use, if it is there.
+fn runtime_folder() -> Result<Option<Finding>, Failure> {
+    let any = Instance::new("any").map_err(Failure::input)?;
+    let Some(folder) = any.folder().parent() else {
+        return Ok(None);
+    };
+    let Ok(metadata) = fs::symlink_metadata(folder) else {
+        return Ok(None);
+    };
+    let mine = metadata.uid() == rustix::process::getuid().as_raw();
+    let wrong = !metadata.is_dir() || !mine || metadata.permissions().mode() & 0o077 != 0;
+    let mend = "it must be a folder of yours with mode 700: remove it, or set CORTEX_RUNTIME_DIR";
+    Ok(Some(Finding::new(
+        "runtime folder",
+        folder.display().to_string(),
+        wrong.then_some(mend),
+    )))
 }
 
 /// Looks at an instance, and, where that is wanted, mends what is wrong with it.

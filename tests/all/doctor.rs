@@ -8,6 +8,8 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
+const FOLDER: &str = "runtime folder";
+
 /// A store of the instance of that name, in that folder.
 fn store(runtime: &Path, name: &str) -> Child {
     let mut store = Command::new(env!("CARGO_BIN_EXE_peer"))
@@ -35,7 +37,10 @@ fn told(runtime: &Path, name: &str, flags: &[&str]) -> (Value, Option<i32>) {
         assert_eq!(finding["ok"], finding["mend"].is_null(), "{finding}");
         assert!(finding["found"].is_string(), "{finding}");
     }
-    let check = Value::from(format!("instance {name}"));
+    let check = match name {
+        FOLDER => Value::from(FOLDER),
+        name => Value::from(format!("instance {name}")),
+    };
     let mut found = findings.into_iter();
     let found = found.find(|finding| finding["check"] == check);
     (found.unwrap_or_default(), output.status.code())
@@ -79,4 +84,18 @@ fn the_doctor_finds_and_mends_what_was_left_and_what_is_open_and_leaves_the_livi
     assert_eq!(told(runtime.path(), name, &["--mend"]).0["ok"], true);
     assert!(!open.exists());
     assert_eq!(told(runtime.path(), name, &[]).0, Value::Null);
+}
+
+#[test]
+fn the_doctor_finds_a_runtime_folder_that_no_store_will_use() {
+    let runtime = tempfile::tempdir().unwrap();
+    assert_eq!(told(runtime.path(), FOLDER, &[]).0, Value::Null);
+    let user = rustix::process::getuid().as_raw();
+    let folder = runtime.path().join(format!("cortex-{user}"));
+    fs::create_dir(&folder).unwrap();
+    for (mode, ok) in [(0o700, true), (0o755, false)] {
+        fs::set_permissions(&folder, Permissions::from_mode(mode)).unwrap();
+        let (finding, _) = told(runtime.path(), FOLDER, &[]);
+        assert_eq!(finding["ok"], ok, "{finding}");
+    }
 }
