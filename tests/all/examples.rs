@@ -1,13 +1,17 @@
 //! The examples in the book, read by the readers of the program. This file guarantees that what a
 //! page shows as a whole file is one.
 
-use crate::support::Program;
+use crate::support::{Program, Run, within};
 use crate::tree::{self, assert_none};
-use dsr::Schema;
+use dsr::{Schema, Session, Time, Transaction};
 use scenarios::Scenario;
 use scenarios::scenario::ProblemKind;
 use std::collections::BTreeSet;
 use std::fs;
+use std::process::Command;
+use std::time::Duration;
+
+const PATIENCE: Duration = Duration::from_secs(20);
 
 /// The contents of a page's fenced blocks in a language, at least one.
 pub(crate) fn blocks(page: &str, language: &str) -> Vec<String> {
@@ -135,6 +139,34 @@ fn the_programs_that_pages_show_are_those_that_are_compiled() {
             assert!(program.contains(&text), "{example} differs");
         }
     }
+}
+
+#[test]
+fn the_agent_in_thirty_lines_keeps_the_robot_at_one_of_its_two_speeds() {
+    let arguments = ["scenarios/care-centre", "--no-baseline"];
+    let mut run = Run::new("careful", &arguments).start();
+    run.until("mission invite is running");
+    let instance = dsr::Instance::new(run.instance_name()).unwrap();
+    let mut session = Session::attach(&instance, "cortex-graph", PATIENCE).unwrap();
+    let mut transaction = Transaction::new();
+    transaction.set("robot", "max_speed", 0.1);
+    session.commit(&transaction, Time::default()).unwrap();
+    let mut agent = Command::new(env!("CARGO_BIN_EXE_careful"))
+        .arg(instance.name())
+        .spawn()
+        .unwrap();
+    let set = within(PATIENCE, || {
+        let snapshot = session.snapshot().unwrap();
+        let robot = snapshot.find_node_by_name("robot").unwrap().unwrap();
+        let speed = robot.value("max_speed").unwrap();
+        (speed == Some(0.7.into()) || speed == Some(0.35.into())).then_some(())
+    });
+    agent.kill().unwrap();
+    agent.wait().unwrap();
+    assert!(set.is_some());
+    drop(session);
+    run.interrupt();
+    run.wait_until_no_process_is_left();
 }
 
 #[test]
