@@ -116,7 +116,12 @@ pub fn value_from_json(json: &Json, expected: Option<ValueKind>) -> Result<Value
 }
 
 fn decode(kind: ValueKind, json: &Json) -> Option<Value> {
-    let number = |json: &Json| json.as_f64().or_else(|| json.as_str()?.parse::<f64>().ok());
+    // Infinity and NaN are written as text; a number that is too large is neither.
+    let text = |text: &str| {
+        let number = text.parse::<f64>().ok()?;
+        (number.is_finite() || !text.contains(|c: char| c.is_ascii_digit())).then_some(number)
+    };
+    let number = |json: &Json| json.as_f64().or_else(|| text(json.as_str()?));
     let natural = |json: &Json| json.as_u64().or_else(|| json.as_str()?.parse::<u64>().ok());
     let numbers = || {
         json.as_array()?
@@ -252,5 +257,13 @@ mod tests {
             let back = value_from_json(&serde_json::from_str(&text).unwrap(), None).unwrap();
             prop_assert_eq!(back, value);
         }
+    }
+
+    #[test]
+    fn a_number_that_is_too_large_is_not_taken_for_infinity() {
+        let read = |text: &str| value_from_json(&text.into(), Some(ValueKind::F64));
+        assert_eq!(read("inf"), Ok(Value::F64(f64::INFINITY)));
+        assert_eq!(read("-1.5"), Ok(Value::F64(-1.5)));
+        assert_eq!(read("1e400"), Err("\"1e400\" is not a f64".to_owned()));
     }
 }
