@@ -4,7 +4,7 @@
 use super::commits::{commit, set};
 use super::figure::Figure;
 use super::hall::{Hall, Peer};
-use super::{Effort, PATIENCE};
+use super::{Effort, PATIENCE, peer};
 use crate::Failure;
 use dsr::Session;
 use std::time::{Duration, Instant};
@@ -60,6 +60,7 @@ fn others(hall: &Hall, session: &mut Session) -> Result<[Peer; 3], Failure> {
 pub(super) fn all(hall: &Hall, effort: Effort, figures: &mut Vec<Figure>) -> Result<(), Failure> {
     let mut session = hall.session("committer")?;
     session.set_spin(PATIENCE);
+    let everywhere = peer::sit(0)?;
     let [mut alone, mut stopped, mut killed] = [(); 3].map(|()| Taken::default());
     for _ in 0..effort.joins {
         alone.go_on(&mut session)?;
@@ -72,6 +73,7 @@ pub(super) fn all(hall: &Hall, effort: Effort, figures: &mut Vec<Figure>) -> Res
         drop(others);
         killed.go_on(&mut session)?;
     }
+    peer::stand(&everywhere)?;
     for (name, taken) in [
         ("commit_ack_beside_stopped", stopped),
         ("commit_ack_beside_killed", killed),

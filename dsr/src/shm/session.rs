@@ -75,7 +75,7 @@ pub enum AttachError {
     Instance(#[from] InstanceError),
     /// No store has shown itself.
     #[error(
-        "instance `{instance}` has no store; start it with `cortex run`, or name another with --instance"
+        "instance `{instance}` has no store, or one that is stopped; start it with `cortex run`, or name another with --instance"
     )]
     NoStore {
         /// The instance's name.
