@@ -4,6 +4,7 @@
 //! declared types (where types are declared at all).
 
 mod combo;
+mod cycles;
 mod schema;
 mod scope;
 
@@ -11,6 +12,7 @@ use crate::parser::{Action, Broken, Finding};
 use crate::{Goal, Grammar, Name, Pattern, PatternNode, Problem, Rule, Types};
 use dsr::suggest;
 use scope::Scope;
+use std::collections::BTreeMap;
 
 /// Checks the rules and combos against each other and the types.
 ///
@@ -103,21 +105,24 @@ impl Check<'_> {
     }
 
     fn type_declarations(&mut self) {
-        let mut seen: Vec<&Name> = Vec::new();
+        let mut seen: BTreeMap<&str, &Name> = BTreeMap::new();
         for name in self.types.names() {
-            match seen.iter().find(|earlier| **earlier == name) {
+            match seen.get(name.as_str()) {
                 // An included file may declare what its includer declares, too.
                 Some(first) if first.span().file == name.span().file => {
                     self.duplicate("type", first, name);
                 }
-                _ => seen.push(name),
+                _ => {
+                    seen.insert(name, name);
+                }
             }
         }
+        let cycles = cycles::cycles(self.types);
         for declaration in &self.types.declarations {
             for parent in &declaration.parents {
                 self.parent(parent);
                 for name in &declaration.names {
-                    if self.types.is_subtype(parent, name) {
+                    if cycles.get(parent.as_str()) == cycles.get(name.as_str()) {
                         self.report(
                             name,
                             Problem::CyclicType {

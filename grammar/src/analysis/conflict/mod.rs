@@ -120,7 +120,12 @@ fn conflicts_within(grammar: &Grammar, limit: u64) -> Conflicts {
     };
     let (mut found, mut left) = (Vec::new(), 0);
     for (one, first) in awake.rules.iter().enumerate() {
-        for two in index.of(&touched[one]) {
+        let looking = index.of(&touched[one]);
+        if found.len() >= CONFLICT_LIMIT || effort.left == 0 {
+            left += looking.len();
+            continue;
+        }
+        for two in looking {
             let second = &awake.rules[two];
             let changes = &touched[one];
             if !effort.spend(changes.checks(&touched[two])) {

@@ -343,9 +343,15 @@ impl<'g> Index<'g> {
     }
 
     /// The rules that look at something of what is changed, in their order.
-    pub(super) fn of(&self, changer: &Touched<'g>) -> BTreeSet<usize> {
+    pub(super) fn of(&self, changer: &Touched<'g>) -> Vec<usize> {
         let words = Touched::words(&changer.changes).into_iter();
-        let rules = words.filter_map(|word| self.0.get(&word)).flatten();
-        rules.copied().collect()
+        let mut lists = words.filter_map(|word| self.0.get(&word));
+        let mut rules = lists.next().cloned().unwrap_or_default();
+        for list in lists {
+            rules.extend(list);
+            rules.sort_unstable();
+            rules.dedup();
+        }
+        rules
     }
 }
