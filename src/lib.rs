@@ -7,6 +7,7 @@ mod bench;
 mod cli;
 mod commands;
 mod conduct;
+mod excerpt;
 mod inspect;
 mod manifests;
 mod progress;
@@ -52,7 +53,8 @@ pub fn main() -> ExitCode {
         .init();
     // Places in files are for editors to jump to: they stay whole, however long.
     let handler = |_: &_| -> Box<dyn miette::ReportHandler> {
-        Box::new(miette::MietteHandlerOpts::new().wrap_lines(false).build())
+        let handler = miette::MietteHandlerOpts::new().wrap_lines(false).build();
+        Box::new(excerpt::Handler(handler))
     };
     // It fails only where there is a handler already, which is as good.
     drop(miette::set_hook(Box::new(handler)));
