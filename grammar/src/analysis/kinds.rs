@@ -56,6 +56,11 @@ impl<'g> Kinds<'g> {
         }
     }
 
+    /// What comparing two types costs.
+    pub(super) fn words(&self) -> u64 {
+        self.names.len().div_ceil(64).max(1) as u64
+    }
+
     pub(super) fn find(&self, name: &str) -> Option<Kind> {
         self.numbers.get(name).copied()
     }

@@ -54,7 +54,7 @@ pub struct Conflict {
 pub struct Conflicts {
     /// In the order of the rules.
     pub found: Vec<Conflict>,
-    /// How many pairs of rules, of which the first changes something like what the second looks at, were not
+    /// At least how many pairs of rules, of which the first changes something like what the second looks at, were not
     /// looked into, or not to the end: there are more conflicts than [`CONFLICT_LIMIT`], or there was more to try than
     /// [`EFFORT_LIMIT`] allows.
     pub left: usize,
@@ -120,15 +120,14 @@ fn conflicts_within(grammar: &Grammar, limit: u64) -> Conflicts {
     };
     let (mut found, mut left) = (Vec::new(), 0);
     for (one, first) in awake.rules.iter().enumerate() {
-        let looking = index.of(&touched[one]);
         if found.len() >= CONFLICT_LIMIT || effort.left == 0 {
-            left += looking.len();
+            left += index.at_least(&touched[one]);
             continue;
         }
-        for two in looking {
+        for two in index.of(&touched[one]) {
             let second = &awake.rules[two];
             let changes = &touched[one];
-            if !effort.spend(changes.checks(&touched[two])) {
+            if !effort.spend(changes.checks(&touched[two]) * kinds.words()) {
                 left += 1;
                 continue;
             }

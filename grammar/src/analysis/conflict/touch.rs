@@ -342,6 +342,13 @@ impl<'g> Index<'g> {
         Self(index)
     }
 
+    /// At least so many rules look at something of what is changed.
+    pub(super) fn at_least(&self, changer: &Touched<'g>) -> usize {
+        let words = Touched::words(&changer.changes).into_iter();
+        let lists = words.filter_map(|word| self.0.get(&word));
+        lists.map(Vec::len).max().unwrap_or(0)
+    }
+
     /// The rules that look at something of what is changed, in their order.
     pub(super) fn of(&self, changer: &Touched<'g>) -> Vec<usize> {
         let words = Touched::words(&changer.changes).into_iter();
