@@ -333,9 +333,9 @@ mod tests {
             owner: dsr::Owner::Node(node.into()),
             name: "n".to_owned(),
         });
-        let rule = name().prop_map(|node| Operation::ApplyRule {
+        let rule = (name(), name()).prop_map(|(x, y)| Operation::ApplyRule {
             rule: "grow".to_owned(),
-            binding: vec![("x".to_owned(), node.into())],
+            binding: vec![("x".to_owned(), x.into()), ("y".to_owned(), y.into())],
         });
         prop_oneof![make, delete, retype, join, part, set, unset, rule]
     }
@@ -360,6 +360,26 @@ mod tests {
                 prop_assert_eq!(replayed.agent().unwrap(), original.agent().unwrap());
             }
             prop_assert_eq!(replayed.rules().unwrap(), original.rules().unwrap());
+        }
+    }
+
+    #[test]
+    fn a_rule_stays_on_record_with_nodes_that_its_commit_made_and_removed() {
+        for y in ["a", "d"] {
+            let mut transaction = Transaction::new();
+            transaction.create_node("thing", "d", Vec::new());
+            transaction.apply_rule(
+                "grow",
+                vec![("x".into(), "d".into()), ("y".into(), y.into())],
+            );
+            transaction.delete_node("d");
+            transaction.delete_node("a");
+            let (items, graph) = recorded(&[transaction]);
+            let mut player = play_all(&items);
+            assert!(player.verdict().mismatches.is_empty());
+            let replayed = player.target.snapshot().unwrap();
+            assert_eq!(replayed.rules().unwrap().len(), 1);
+            assert_eq!(replayed.rules(), graph.snapshot().rules());
         }
     }
 

@@ -187,8 +187,45 @@ impl CommitRow {
         {
             self::edge(&mut made, row)?;
         }
+        let passing = self.passing(graph)?;
+        let any = graph.schema().types().first();
+        for &id in &passing {
+            made.transaction.push(Operation::CreateNode {
+                id: Some(NodeId(id)),
+                type_name: any.map_or("thing", |known| &known.name).to_owned(),
+                name: format!("passing-{id}"),
+                attributes: Vec::new(),
+            });
+        }
         made.rules(&self.rules, false)?;
+        for id in passing {
+            made.transaction.delete_node(node_ref(id));
+        }
         Ok(made.transaction)
+    }
+
+    /// The nodes that a rule was bound to beside one that this commit made, and that are not there after
+    /// it: it stays on record with them, so they have to be there while it is applied.
+    fn passing(&self, graph: &Snapshot) -> Result<BTreeSet<u64>, ReadError> {
+        let there = |id: u64| Ok(graph.find_node(NodeId(id))?.is_some());
+        let mut passing = BTreeSet::new();
+        for rule in &self.rules {
+            let before: Vec<bool> = rule
+                .ids
+                .values()
+                .map(|id| there(*id))
+                .collect::<Result<_, _>>()?;
+            if before.iter().all(|before| *before) {
+                continue;
+            }
+            for (&id, before) in rule.ids.values().zip(before) {
+                let row = self.nodes.iter().find(|row| row.id == id);
+                if !row.map_or(before, |row| row.touch != TouchRow::Deleted) {
+                    passing.insert(id);
+                }
+            }
+        }
+        Ok(passing)
     }
 
     fn take_away(&self, made: &mut Rebuilt<'_>) -> Result<(), RowError> {
