@@ -40,7 +40,7 @@ pub struct SocialConfig {
     pub usage: UsageCurve,
     /// R(t) of single objects, by name.
     pub usage_of: BTreeMap<String, UsageCurve>,
-    /// Points of a person's polylines.
+    /// Points of each polyline of a person or a group, from 3 to 1000.
     pub contour_points: usize,
     /// Widths of people who do something in particular, by its name (AP Fig. 2).
     pub activities: BTreeMap<String, FourSided>,
@@ -118,8 +118,13 @@ impl SocialConfig {
         let mut checks = vec![
             (
                 "resolution".to_owned(),
-                self.resolution.is_finite() && self.resolution > 0.0,
-                "must be a finite length greater than 0",
+                (0.005..=10.0).contains(&self.resolution),
+                "must be from 0.005 m to 10 m",
+            ),
+            (
+                "contour_points".to_owned(),
+                (3..=1000).contains(&self.contour_points),
+                "must be from 3 to 1000",
             ),
             (
                 "proxemics.shape".to_owned(),
@@ -138,8 +143,8 @@ impl SocialConfig {
             ),
             (
                 "clearance_width".to_owned(),
-                not_negative(self.clearance_width),
-                length,
+                (0.0..=1000.0).contains(&self.clearance_width),
+                "must be from 0 m to 1000 m",
             ),
             (
                 "between_half_width".to_owned(),
@@ -224,7 +229,8 @@ mod tests {
     #[test]
     fn figures_that_make_no_map_are_all_named() {
         let mut config = SocialConfig {
-            resolution: 0.0,
+            resolution: 1e-9,
+            contour_points: 20_000_000,
             ..SocialConfig::default()
         };
         config.proxemics.levels.personal = 0.95;
@@ -234,6 +240,7 @@ mod tests {
         let fields: Vec<_> = problems.iter().map(|p| p.field.as_str()).collect();
         let expected = [
             "resolution",
+            "contour_points",
             "proxemics.levels",
             "spaces.bath",
             "activity_in.hall",

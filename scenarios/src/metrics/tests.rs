@@ -246,7 +246,7 @@ goal = "visit.aggt"
     let error = object_spaces(&scenario, &config).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "social mapping: resolution must be a finite length greater than 0"
+        "social mapping: resolution must be from 0.005 m to 10 m"
     );
 }
 

@@ -96,7 +96,7 @@ pub(super) fn check(
     };
     let Conflicts { found, left } = found;
     diagnostics.extend(found.iter().map(|conflict| conflict.diagnostic.clone()));
-    diagnostics.sort_by_key(|d| {
+    diagnostics.sort_by_cached_key(|d| {
         let included = grammar.files.iter().position(|file| *file == d.file);
         (included.unwrap_or(usize::MAX), d.span.start)
     });

@@ -58,7 +58,7 @@ fn what_social_mapping_cannot_use_is_told_with_its_place() {
     );
     let problems = with("[social]\nresolution = 0\nclearance_cost = -1");
     assert_eq!(problems.len(), 2, "{problems:?}");
-    assert!(problems[0].contains("resolution must be a finite length greater than 0"));
+    assert!(problems[0].contains("resolution must be from 0.005 m to 10 m"));
 }
 
 #[test]

@@ -231,7 +231,7 @@ fn settings_of_the_world_hold_from_the_next_turn_and_wrong_ones_are_reported() {
         (
             2.0,
             r#"{"resolution": -1}"#,
-            "resolution must be a finite length greater than 0",
+            "resolution must be from 0.005 m to 10 m",
         ),
         (3.0, r#"{"resolutoin": 1}"#, "unknown field `resolutoin`"),
     ] {
