@@ -323,7 +323,7 @@ impl<'h, H: Host> Search<'h, H> {
                 return Ok(());
             };
             if let Some(before) = depth.checked_sub(1)
-                && !(is_free && step.others[0].is_empty())
+                && !(is_free && step.others.iter().all(Vec::is_empty))
             {
                 bind(above, plan, (before, level.parent), environment);
             }
