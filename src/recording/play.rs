@@ -364,13 +364,21 @@ mod tests {
     }
 
     #[test]
-    fn a_rule_stays_on_record_with_nodes_that_its_commit_made_and_removed() {
+    fn rules_stay_on_record_in_order_with_nodes_that_their_commit_made_and_removed() {
         for y in ["a", "d"] {
             let mut transaction = Transaction::new();
             transaction.create_node("thing", "d", Vec::new());
             transaction.apply_rule(
                 "grow",
+                vec![("x".into(), "b".into()), ("y".into(), y.into())],
+            );
+            transaction.apply_rule(
+                "grow",
                 vec![("x".into(), "d".into()), ("y".into(), y.into())],
+            );
+            transaction.apply_rule(
+                "grow",
+                vec![("x".into(), "b".into()), ("y".into(), "c".into())],
             );
             transaction.delete_node("d");
             transaction.delete_node("a");
@@ -378,7 +386,7 @@ mod tests {
             let mut player = play_all(&items);
             assert!(player.verdict().mismatches.is_empty());
             let replayed = player.target.snapshot().unwrap();
-            assert_eq!(replayed.rules().unwrap().len(), 1);
+            assert_eq!(replayed.rules().unwrap().len(), 3);
             assert_eq!(replayed.rules(), graph.snapshot().rules());
         }
     }

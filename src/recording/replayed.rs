@@ -116,18 +116,11 @@ impl Rebuilt<'_> {
         })
     }
 
-    fn rules(&mut self, rows: &[RuleRow], first: bool) -> Result<(), ReadError> {
+    fn rules(&mut self, rows: &[RuleRow]) {
         for row in rows {
-            let mut known = true;
-            for id in row.ids.values() {
-                known &= self.there(*id)?;
-            }
-            if known == first {
-                let bound = row.ids.iter().map(|(var, id)| (var.clone(), node_ref(*id)));
-                self.transaction.apply_rule(&row.rule, bound.collect());
-            }
+            let bound = row.ids.iter().map(|(var, id)| (var.clone(), node_ref(*id)));
+            self.transaction.apply_rule(&row.rule, bound.collect());
         }
-        Ok(())
     }
 
     /// What makes the attributes of what is there those of a row; where `whole`, and no others.
@@ -175,7 +168,14 @@ impl CommitRow {
             graph,
             transaction: Transaction::new(),
         };
-        made.rules(&self.rules, true)?;
+        // All before the rest or all after it: they stay in their order.
+        let mut before = true;
+        for id in self.rules.iter().flat_map(|rule| rule.ids.values()) {
+            before &= made.there(*id)?;
+        }
+        if before {
+            made.rules(&self.rules);
+        }
         self.take_away(&mut made)?;
         for row in &self.nodes {
             self::node(&mut made, row)?;
@@ -187,7 +187,10 @@ impl CommitRow {
         {
             self::edge(&mut made, row)?;
         }
-        let passing = self.passing(graph)?;
+        if before {
+            return Ok(made.transaction);
+        }
+        let passing = self.passing(&made)?;
         let any = graph.schema().types().first();
         for &id in &passing {
             made.transaction.push(Operation::CreateNode {
@@ -197,32 +200,24 @@ impl CommitRow {
                 attributes: Vec::new(),
             });
         }
-        made.rules(&self.rules, false)?;
+        made.rules(&self.rules);
         for id in passing {
             made.transaction.delete_node(node_ref(id));
         }
         Ok(made.transaction)
     }
 
-    /// The nodes that a rule was bound to beside one that this commit made, and that are not there after
-    /// it: it stays on record with them, so they have to be there while it is applied.
-    fn passing(&self, graph: &Snapshot) -> Result<BTreeSet<u64>, ReadError> {
-        let there = |id: u64| Ok(graph.find_node(NodeId(id))?.is_some());
+    /// The nodes that rules were bound to and that are not there after this commit: rules stay on record with
+    /// them, so they have to be there while these are applied.
+    fn passing(&self, made: &Rebuilt<'_>) -> Result<BTreeSet<u64>, ReadError> {
         let mut passing = BTreeSet::new();
-        for rule in &self.rules {
-            let before: Vec<bool> = rule
-                .ids
-                .values()
-                .map(|id| there(*id))
-                .collect::<Result<_, _>>()?;
-            if before.iter().all(|before| *before) {
-                continue;
-            }
-            for (&id, before) in rule.ids.values().zip(before) {
-                let row = self.nodes.iter().find(|row| row.id == id);
-                if !row.map_or(before, |row| row.touch != TouchRow::Deleted) {
-                    passing.insert(id);
-                }
+        for &id in self.rules.iter().flat_map(|rule| rule.ids.values()) {
+            let stays = match self.nodes.iter().find(|row| row.id == id) {
+                Some(row) => row.touch != TouchRow::Deleted,
+                None => made.there(id)?,
+            };
+            if !stays {
+                passing.insert(id);
             }
         }
         Ok(passing)
