@@ -403,3 +403,26 @@ fn bind<H: Host>(
         row = level.parents[row];
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{graph, read};
+
+    #[test]
+    fn the_far_end_of_a_link_is_none_of_the_nodes_that_are_bound() {
+        let grammar = read(
+            "name=n\n===\ntypes {\n(thing)\n(tool)\n(pot : thing tool)\n(cup : thing)\n}\n===\n\
+             by : passive(1) { { c:thing b:cup a:tool b->c(by) } => { c:thing b:cup a:tool } }\n",
+        );
+        let links = [("cup1", "by", "cup1"), ("cup1", "by", "pot1")];
+        let one_tool = [("cup", "cup1"), ("thing", "thing1"), ("pot", "pot1")];
+        let two_tools = [&one_tool[..], &[("tool", "tool1")]].concat();
+        for (nodes, count) in [(&one_tool[..], 0), (&two_tools, 1)] {
+            let graph = graph(nodes, &links);
+            let snapshot = graph.snapshot();
+            let found = grammar.matches(&snapshot, &grammar.rules[0], &Binding::new());
+            assert_eq!(found.unwrap().count_all(), Ok(count));
+        }
+    }
+}
