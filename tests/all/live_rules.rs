@@ -87,6 +87,14 @@ fn until(session: &mut Session, what: &str, holds: impl Fn(&Snapshot) -> bool) {
     }
 }
 
+/// Until a mission runs and has said why it has no plan.
+fn until_no_plan(session: &mut Session) {
+    until(session, "a mission without a plan", |snapshot| {
+        texts(snapshot, "mission", "status").contains(&"running".to_owned())
+            && !texts(snapshot, "mission", "reason").concat().is_empty()
+    });
+}
+
 #[test]
 fn a_mission_uses_a_rule_that_was_loaded_later_and_a_bad_grammar_changes_nothing() {
     let instance = TestInstance::new("live-rules");
@@ -103,10 +111,7 @@ fn a_mission_uses_a_rule_that_was_loaded_later_and_a_bad_grammar_changes_nothing
     );
     let name = instance.name();
     let (_members, mut session) = start(folder.path(), &instance);
-    until(&mut session, "a mission without a plan", |snapshot| {
-        texts(snapshot, "mission", "status").contains(&"running".to_owned())
-            && !texts(snapshot, "mission", "reason").concat().is_empty()
-    });
+    until_no_plan(&mut session);
     assert_eq!(texts(&session.snapshot().unwrap(), "step", "rule"), [""; 0]);
 
     // A bad grammar is refused with all that is wrong with it.
@@ -201,10 +206,7 @@ fn a_rule_that_one_agent_wakes_is_planned_with_by_another_until_it_is_put_to_sle
     );
     let name = instance.name();
     let (_members, mut session) = start(folder.path(), &instance);
-    until(&mut session, "a mission without a plan", |snapshot| {
-        texts(snapshot, "mission", "status").contains(&"running".to_owned())
-            && !texts(snapshot, "mission", "reason").concat().is_empty()
-    });
+    until_no_plan(&mut session);
     let file = folder.path().join("rules.aggl");
     let file = file.to_str().unwrap();
     let apply = |rule: &str, binding: &[&str]| {
