@@ -3,7 +3,8 @@
 
 use nalgebra::Point2;
 use spade::{
-    DelaunayTriangulation, HasPosition, Triangulation as _, mitigate_underflow, validate_coordinate,
+    DelaunayTriangulation, HasPosition, HierarchyHintGenerator, Triangulation as _,
+    mitigate_underflow, validate_coordinate,
 };
 use std::collections::BTreeMap;
 
@@ -32,8 +33,11 @@ impl HasPosition for Vertex {
     }
 }
 
+/// Finds its way from place to place through a pyramid of ever fewer of them.
+type Triangles = DelaunayTriangulation<Vertex, (), (), (), HierarchyHintGenerator<f64>>;
+
 impl Mesh {
-    /// The mesh of `places`; O(n log n). A place beyond spade's range (2^201 m) is none: it has no
+    /// The mesh of `places`; O(n log n) wherever they are, also in a row. A place beyond spade's range (2^201 m) is none: it has no
     /// neighbours, and everybody else the mesh that they would have without it.
     pub(super) fn new(places: &[Point2<f64>]) -> Self {
         let mut spots: BTreeMap<[u64; 2], usize> = BTreeMap::new();
@@ -56,11 +60,16 @@ impl Mesh {
                 }
             }
         }
-        let Ok(mesh) = DelaunayTriangulation::<Vertex>::bulk_load_stable(vertices) else {
-            // Every vertex is within its range.
-            return Self::default();
-        };
         let mut edges = on_one_spot.clone();
+        let Some(mesh) = triangles(&mut vertices) else {
+            edges.extend(row(&mut vertices));
+            edges.sort_unstable();
+            return Self {
+                edges,
+                on_one_spot,
+                triangles: Vec::new(),
+            };
+        };
         edges.extend(mesh.undirected_edges().map(|edge| {
             let [a, b] = edge.vertices().map(|vertex| vertex.data().index);
             (a.min(b), a.max(b))
@@ -83,9 +92,76 @@ impl Mesh {
     }
 }
 
+/// The triangles of vertices on different spots; `None` where all are exactly in a row.
+///
+/// Who comes in the order of the places would have to look past everybody before them, and as long as all are in a row
+/// there is no shorter way to one of them. So the first three span a triangle, and the others come as if by chance.
+fn triangles(vertices: &mut [Vertex]) -> Option<Triangles> {
+    vertices.sort_by_key(|vertex| scattered(vertex.position));
+    let first = vertices.first()?.position;
+    let far = farthest(vertices, |place| {
+        (place.x - first.x).hypot(place.y - first.y)
+    })?;
+    let mut mesh = Triangles::new();
+    mesh.insert(vertices[0]).ok()?;
+    mesh.insert(vertices[far]).ok()?;
+    let line = mesh.directed_edges().next()?;
+    let way = line.positions();
+    let aside = farthest(vertices, |place| {
+        let (x, y) = (way[1].x - way[0].x, way[1].y - way[0].y);
+        let aside = (x * (place.y - way[0].y) - y * (place.x - way[0].x)).abs();
+        // The sum above rounds; the query is exact.
+        if line.side_query(place).is_on_line() {
+            0.0
+        } else {
+            aside.max(f64::MIN_POSITIVE)
+        }
+    })?;
+    mesh.insert(vertices[aside]).ok()?;
+    let first = [0, far, aside];
+    for (at, vertex) in vertices.iter().enumerate() {
+        if !first.contains(&at) {
+            mesh.insert(*vertex).ok()?;
+        }
+    }
+    Some(mesh)
+}
+
+/// Which vertex has the greatest distance, where one has any.
+fn farthest(vertices: &[Vertex], distance: impl Fn(spade::Point2<f64>) -> f64) -> Option<usize> {
+    let distances = vertices.iter().map(|vertex| distance(vertex.position));
+    let (at, most) = distances
+        .enumerate()
+        .max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    (most > 0.0).then_some(at)
+}
+
+/// A number for a place, as unlike those of its neighbours as if drawn (the finalizer of `SplitMix64`).
+fn scattered(place: spade::Point2<f64>) -> u64 {
+    let mixed = |mut z: u64| {
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    };
+    mixed(mixed(place.x.to_bits()).wrapping_add(place.y.to_bits()))
+}
+
+/// Neighbours among vertices that are all in a row.
+fn row(vertices: &mut [Vertex]) -> Vec<(usize, usize)> {
+    vertices.sort_by(|a, b| {
+        let (a, b) = (a.position, b.position);
+        a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y))
+    });
+    let pairs = vertices
+        .windows(2)
+        .map(|pair| (pair[0].index, pair[1].index));
+    pairs.map(|(a, b)| (a.min(b), a.max(b))).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     #[test]
     fn a_square_with_somebody_in_the_middle_has_four_triangles() {
@@ -108,6 +184,78 @@ mod tests {
         assert_eq!(row(&[3.0, 1.0, 2.0]).edges, [(0, 2), (1, 2)]);
         assert_eq!(row(&[0.0, 1.0, -0.0]).edges, [(0, 1), (0, 2)]);
         assert_eq!(row(&[1e300, 1.0]).edges, []);
+    }
+
+    /// Places without any structure, in [0, 1) each way.
+    fn chance(count: u64) -> impl Iterator<Item = f64> {
+        let place = |at: u64| spade::Point2::new(at as f64, 0.0);
+        (0..count).map(move |at| (scattered(place(at)) >> 11) as f64 / (1u64 << 53) as f64)
+    }
+
+    /// Where each new place is looked for past all that are there already, this takes minutes.
+    #[test]
+    fn rows_of_a_hundred_thousand_have_a_mesh() {
+        const MANY: usize = 100_000;
+        let chance: Vec<f64> = chance(MANY as u64).collect();
+        let place = |at: usize, kind: usize| {
+            let along = at as f64;
+            match kind {
+                0 => Point2::new(0.5 * along, 0.0),
+                1 => Point2::new(0.0, -2.0 * along),
+                // Beside the line by what rounding leaves.
+                2 => Point2::new(0.3 * along, 0.1 * along),
+                3 => Point2::new(0.5 * along, 1e-9 * chance[at]),
+                // Two rows, and one beside everybody.
+                4 => Point2::new((at / 2) as f64, (at % 2) as f64),
+                _ => Point2::new(0.5 * along, if at == 7 { 3.0 } else { 0.0 }),
+            }
+        };
+        let counts: Vec<[usize; 2]> = (0..6)
+            .map(|kind| {
+                let places: Vec<_> = (0..MANY).map(|at| place(at, kind)).collect();
+                let mesh = Mesh::new(&places);
+                [mesh.edges.len(), mesh.triangles.len()]
+            })
+            .collect();
+        assert_eq!(counts[..2], [[MANY - 1, 0]; 2]);
+        assert_eq!(counts[4], [2 * MANY - 3, MANY - 2]);
+        assert_eq!(counts[5], [2 * MANY - 3, MANY - 2]);
+        for [edges, triangles] in counts {
+            // Euler: no crossing, no hole.
+            assert!(triangles == 0 || edges == MANY - 1 + triangles);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn no_place_is_within_the_circle_of_a_triangle(
+            places in prop::collection::btree_set((-9i32..9, -9i32..9), 0..40),
+        ) {
+            let places: Vec<_> = places
+                .into_iter()
+                .map(|(x, y)| Point2::new(f64::from(x), f64::from(y)))
+                .collect();
+            let mesh = Mesh::new(&places);
+            for corners in &mesh.triangles {
+                let [a, b, c] = corners.map(|corner| places[corner]);
+                for place in &places {
+                    let [a, b, c] = [a, b, c].map(|corner| corner - place);
+                    let square = |v: nalgebra::Vector2<f64>| v.norm_squared();
+                    let within = square(a) * b.perp(&c) + square(b) * c.perp(&a) + square(c) * a.perp(&b);
+                    let turn = (b - a).perp(&(c - a));
+                    prop_assert!(within * turn.signum() <= 0.0, "{place} in {corners:?}");
+                }
+            }
+            let mut reversed = places.clone();
+            reversed.reverse();
+            let mut renamed: Vec<(usize, usize)> = Mesh::new(&reversed)
+                .edges
+                .into_iter()
+                .map(|(a, b)| (places.len() - 1 - b, places.len() - 1 - a))
+                .collect();
+            renamed.sort_unstable();
+            prop_assert_eq!(mesh.edges, renamed);
+        }
     }
 
     #[test]

@@ -90,6 +90,23 @@ fn a_hundred_thousand_people_are_grouped() {
     assert!(groups(Method::TriangulationStrict, &people).is_empty());
 }
 
+/// How near is near depends on how many are around, and around the ends of a row there are half as many.
+#[test]
+fn of_an_even_row_at_most_the_ends_are_groups() {
+    let row = |count: usize| -> Vec<Isometry2<f64>> {
+        let place = |at: usize| Vector2::new(at as f64, 0.0);
+        (0..count)
+            .map(|at| Isometry2::new(place(at), PI / 2.0))
+            .collect()
+    };
+    for count in [20, 100_000] {
+        assert_eq!(
+            groups(Method::Facing, &row(count)),
+            [[0, 1], [count - 2, count - 1]]
+        );
+    }
+}
+
 #[test]
 fn more_people_than_bodies_fit_are_refused() {
     let people = vec![Isometry2::identity(); 20_001];
