@@ -73,6 +73,52 @@ pub enum ScenesError {
         /// The name.
         person: u64,
     },
+    /// A person stands in two groups of a frame.
+    #[error("frame {frame} has person {person} in two groups")]
+    TwoGroups {
+        /// From 0.
+        frame: usize,
+        /// The name.
+        person: u64,
+    },
+    /// There is nothing to look at.
+    #[error("there are no {what}")]
+    Empty {
+        /// What there should be.
+        what: &'static str,
+    },
+    /// Two in a scene have one name; the robot's is 0.
+    #[error("line {line}: {name} is in the scene twice (the robot is {ROBOT})")]
+    TwiceInScene {
+        /// From 1.
+        line: usize,
+        /// The name.
+        name: u64,
+    },
+    /// A link is of a kind that is not known.
+    #[error("line {line}: a link is of the kind `{kind}`; there is `{INTERACT}`")]
+    LinkKind {
+        /// From 1.
+        line: usize,
+        /// As given.
+        kind: String,
+    },
+    /// A link leads from somebody to themselves.
+    #[error("line {line}: a link leads from {name} to {name}")]
+    LinkToItself {
+        /// From 1.
+        line: usize,
+        /// The name.
+        name: u64,
+    },
+    /// A rating is none.
+    #[error("line {line}: the score {score:?} is not from 0 to 100")]
+    Score {
+        /// From 1.
+        line: usize,
+        /// As given.
+        score: f64,
+    },
     /// A link leads from or to something that is not in the scene.
     #[error("line {line}: a link names {name}, which is not in the scene")]
     Link {
@@ -106,7 +152,7 @@ struct PersonRecord {
     task: Option<String>,
 }
 
-/// Reads a recording: JSON with `frames`, each `{"t", "people": [{"id", "x_m", "y_m", "theta_rad"}],
+/// Reads a recording of at least one frame: JSON with `frames`, each `{"t", "people": [{"id", "x_m", "y_m", "theta_rad"}],
 /// "groups": [[id, ...]]}`; `groups` may be missing, and of people the texts `activity`, `features` and
 /// `task`. Metres, radians counter-clockwise from +x.
 ///
@@ -114,6 +160,9 @@ struct PersonRecord {
 /// [`ScenesError`].
 pub fn parse_recording(text: &str) -> Result<Recording, ScenesError> {
     let file: RecordingFile = serde_json::from_str(text).map_err(|e| json_error(&e, 0))?;
+    if file.frames.is_empty() {
+        return Err(ScenesError::Empty { what: "frames" });
+    }
     let mut frames = Vec::with_capacity(file.frames.len());
     for (index, frame) in file.frames.into_iter().enumerate() {
         let mut seen = BTreeSet::new();
@@ -131,6 +180,14 @@ pub fn parse_recording(text: &str) -> Result<Recording, ScenesError> {
                 activity: person.activity,
                 features: person.features,
                 task: person.task,
+            });
+        }
+        let mut grouped = BTreeSet::new();
+        let mut members = frame.groups.iter().flatten().flatten();
+        if let Some(person) = members.find(|person| !grouped.insert(**person)) {
+            return Err(ScenesError::TwoGroups {
+                frame: index,
+                person: *person,
             });
         }
         frames.push(Frame {
@@ -194,10 +251,12 @@ struct EntityRecord {
 const CM: f64 = 0.01;
 /// The robot's number in the links of a scene.
 const ROBOT: u64 = 0;
+/// The only kind of link: the first attends to the second.
+const INTERACT: &str = "interact";
 
 /// Reads scenes, one JSON object a line, as the `SocNav1` data set has them: the robot at the
 /// origin, centimetres, degrees, a heading being the orientation less 90; `links` of who attends to
-/// whom or what; the room's outline. Empty lines are passed over.
+/// whom or what; the room's outline. Empty lines are passed over, and at least one is a scene.
 ///
 /// # Errors
 /// [`ScenesError`].
@@ -208,20 +267,31 @@ pub fn parse_scenes(text: &str) -> Result<Vec<RatedScene>, ScenesError> {
             continue;
         }
         let record: SceneRecord = serde_json::from_str(line).map_err(|e| json_error(&e, before))?;
+        let line = before + 1;
+        if let Some(score) = record.score.filter(|score| !(0.0..=100.0).contains(score)) {
+            return Err(ScenesError::Score { line, score });
+        }
         let mut places = BTreeMap::from([(ROBOT, Point2::origin())]);
         for entity in record.humans.iter().chain(&record.objects) {
             let place = Point2::new(entity.x_pos * CM, entity.y_pos * CM);
-            places.insert(entity.id, place);
+            let name = entity.id;
+            if places.insert(name, place).is_some() {
+                return Err(ScenesError::TwiceInScene { line, name });
+            }
         }
         let mut links = Vec::with_capacity(record.links.len());
-        for (from, to, _) in &record.links {
+        for (from, to, kind) in &record.links {
             let place = |name: &u64| {
-                let missing = ScenesError::Link {
-                    line: before + 1,
-                    name: *name,
-                };
+                let missing = ScenesError::Link { line, name: *name };
                 places.get(name).copied().ok_or(missing)
             };
+            if kind != INTERACT {
+                let kind = kind.clone();
+                return Err(ScenesError::LinkKind { line, kind });
+            }
+            if from == to {
+                return Err(ScenesError::LinkToItself { line, name: *from });
+            }
             links.push([place(from)?, place(to)?]);
         }
         let people = record.humans.iter().map(|human| {
@@ -246,6 +316,9 @@ pub fn parse_scenes(text: &str) -> Result<Vec<RatedScene>, ScenesError> {
             },
             score: record.score,
         });
+    }
+    if scenes.is_empty() {
+        return Err(ScenesError::Empty { what: "scenes" });
     }
     Ok(scenes)
 }
@@ -294,6 +367,14 @@ mod tests {
         assert_eq!(refused(&twice), "frame 0 has person 4 twice");
         let vast = twice.replacen("1,", "1e999,", 1);
         assert!(refused(&vast).contains("number out of range"));
+        assert_eq!(refused("{\"frames\": []}"), "there are no frames");
+        let groups = |groups: &str| {
+            format!("{{\"frames\": [{{\"t\": 1, \"people\": [], \"groups\": {groups}}}]}}")
+        };
+        assert_eq!(
+            refused(&groups("[[1, 2], [3, 2]]")),
+            "frame 0 has person 2 in two groups"
+        );
     }
 
     #[test]
@@ -314,10 +395,41 @@ mod tests {
         );
         assert_eq!(scene.room.len(), 3);
         assert_eq!(scenes[1].scene, ComfortScene::default());
-        let lost = text.replace("[[1, 2,", "[[1, 7,");
+        for (from, to, problem) in [
+            (
+                "[[1, 2,",
+                "[[1, 7,",
+                "line 2: a link names 7, which is not in the scene",
+            ),
+            ("[[1, 2,", "[[1, 1,", "line 2: a link leads from 1 to 1"),
+            (
+                "\"interact\"",
+                "\"hit\"",
+                "line 2: a link is of the kind `hit`; there is `interact`",
+            ),
+            (
+                "[{\"id\": 2",
+                "[{\"id\": 1",
+                "line 2: 1 is in the scene twice (the robot is 0)",
+            ),
+            (
+                "[{\"id\": 1",
+                "[{\"id\": 0",
+                "line 2: 0 is in the scene twice (the robot is 0)",
+            ),
+            (
+                "40",
+                "-1e300",
+                "line 2: the score -1e300 is not from 0 to 100",
+            ),
+        ] {
+            let changed = text.replace(from, to);
+            assert_ne!(changed, text);
+            assert_eq!(parse_scenes(&changed).unwrap_err().to_string(), problem);
+        }
         assert_eq!(
-            parse_scenes(&lost).unwrap_err().to_string(),
-            "line 2: a link names 7, which is not in the scene"
+            parse_scenes("\n\n").unwrap_err().to_string(),
+            "there are no scenes"
         );
     }
 }

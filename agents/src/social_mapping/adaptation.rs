@@ -6,7 +6,8 @@
 //! deviation the width to a side is `d'^-b / a`, with `d' = d_s - margin` and `d_s = d - d_r`, d being
 //! the distance to the wall on that side.
 
-use super::four_sided::FourSided;
+use super::four_sided::{FourSided, WIDTHS};
+use super::limits::is_length;
 use super::scene::Wall;
 use nalgebra::{Isometry2, Point2, Vector2};
 use serde::{Deserialize, Serialize};
@@ -102,15 +103,18 @@ impl WallAdaptation {
     /// Whether the figures make sense.
     pub fn is_valid(&self) -> bool {
         let gives = [self.front, self.sides, self.rear];
-        let positive = |x: f64| x.is_finite() && x > 0.0;
-        positive(self.factor)
-            && self.exponent.is_finite()
-            && self.exponent < 0.0
-            && [self.clearance, self.margin]
-                .iter()
-                .all(|x| x.is_finite() && *x >= 0.0)
+        // The width grows with the distance, so those at the ends of the range say all.
+        let sound =
+            |distance: f64| WIDTHS.contains(&self.inverse_width(distance - self.margin).recip());
+        self.exponent < 0.0
+            && is_length(self.clearance)
+            && is_length(self.margin)
             && gives.iter().all(|give| {
-                give.least > self.margin && give.most.is_finite() && give.least <= give.most
+                give.least > self.margin
+                    && give.least <= give.most
+                    && is_length(give.most)
+                    && sound(give.least)
+                    && sound(give.most)
             })
     }
 

@@ -6,6 +6,7 @@ use super::features::Features;
 use super::four_sided::FourSided;
 use super::gaussian::AsymmetricGaussian;
 use super::groups::Grouping;
+use super::limits::{MOST_COST, is_length};
 use super::object_space::{Space, UsageCurve};
 use super::personal::{self, CooperationZone, MOST_ZONES};
 use super::zones::{Levels, Proxemics};
@@ -112,9 +113,9 @@ impl SocialConfig {
 
     /// Everything that is wrong with the figures.
     pub fn problems(&self) -> Vec<ConfigError> {
-        let not_negative = |x: f64| x.is_finite() && x >= 0.0;
-        let length = "must be a finite length, not negative";
-        let curve = "needs 1 <= least <= most, a ramp longer than 0 s and steps larger than 0";
+        let length = "must be from 0 m to 1000 m";
+        let curve = "needs 1 <= least <= most <= 1000, a ramp and steps every 0.001 s to 1e9 s, and a rise above 0 and at \
+                     most 1000";
         let mut checks = vec![
             (
                 "resolution".to_owned(),
@@ -138,22 +139,22 @@ impl SocialConfig {
             ),
             (
                 "clearance_cost".to_owned(),
-                not_negative(self.clearance_cost),
-                "must be finite and not negative",
+                (0.0..=MOST_COST).contains(&self.clearance_cost),
+                "must be from 0 to 1000",
             ),
             (
                 "clearance_width".to_owned(),
-                (0.0..=1000.0).contains(&self.clearance_width),
-                "must be from 0 m to 1000 m",
+                is_length(self.clearance_width),
+                length,
             ),
             (
                 "between_half_width".to_owned(),
-                not_negative(self.between_half_width),
+                is_length(self.between_half_width),
                 length,
             ),
             (
                 "between_reach".to_owned(),
-                not_negative(self.between_reach),
+                is_length(self.between_reach),
                 length,
             ),
             ("usage".to_owned(), self.usage.is_valid(), curve),
@@ -164,7 +165,8 @@ impl SocialConfig {
                 .map(|(o, c)| (format!("usage_of.{o}"), c.is_valid(), curve)),
         );
         checks.extend(self.spaces.iter().map(|(class, space)| {
-            let requirement = "needs finite lengths greater than 0 and an opening below pi";
+            let requirement =
+                "needs lengths above 0 m and at most 1000 m, and an opening from 0 to 3.13";
             (format!("spaces.{class}"), space.is_valid(), requirement)
         }));
         checks.extend(self.activities.iter().map(|(name, shape)| {
@@ -182,7 +184,7 @@ impl SocialConfig {
         checks.extend(self.cooperation.iter().map(|(task, zones)| {
             let valid = zones.len() <= MOST_ZONES && zones.iter().all(CooperationZone::is_valid);
             let requirement =
-                "needs at most two zones, each with an opening above 0 and at most 2 pi";
+                "needs at most two zones, each with a direction from -2 pi to 2 pi, and an opening above 0 and at most 2 pi";
             (format!("cooperation.{task}"), valid, requirement)
         }));
         checks.extend([
@@ -194,12 +196,14 @@ impl SocialConfig {
             (
                 "walls".to_owned(),
                 self.walls.is_none_or(|walls| walls.is_valid()),
-                "needs lengths that are finite, least <= most above the margin, and an exponent below 0",
+                "needs a clearance and a margin from 0 m to 1000 m, margin < least <= most <= 1000 m, an exponent below 0, \
+                 and with that and its factor widths from 0.001 m to 1000 m",
             ),
             (
                 "grouping".to_owned(),
                 self.grouping.is_valid(),
-                "needs finite figures, and lengths greater than 0",
+                "needs figures of at most 1e6, not negative but for bond; lengths above 0 m, of at most 1000 m; crowd_radius \
+                 from 0.001 m to 10 m; field_of_view above 0 and at most pi",
             ),
         ]);
         checks
@@ -211,41 +215,4 @@ impl SocialConfig {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::social_mapping::map::SocialMapper;
-
-    #[test]
-    fn adaptive_proxemics_has_its_zones_at_the_papers_distances() {
-        let config = SocialConfig::adaptive_proxemics();
-        assert!(config.problems().is_empty());
-        let Proxemics { shape, levels } = config.proxemics;
-        for (far, level) in [(0.4, levels.intimate), (1.2, levels.personal)] {
-            let density = (-0.5 * (far / shape.side).powi(2)).exp();
-            assert!((density - level).abs() < 1e-12);
-        }
-    }
-
-    #[test]
-    fn figures_that_make_no_map_are_all_named() {
-        let mut config = SocialConfig {
-            resolution: 1e-9,
-            contour_points: 20_000_000,
-            ..SocialConfig::default()
-        };
-        config.proxemics.levels.personal = 0.95;
-        config.spaces.insert("bath".into(), Space::Margin(f64::NAN));
-        config.activity_in.insert("hall".into(), "dancing".into());
-        let problems = config.problems();
-        let fields: Vec<_> = problems.iter().map(|p| p.field.as_str()).collect();
-        let expected = [
-            "resolution",
-            "contour_points",
-            "proxemics.levels",
-            "spaces.bath",
-            "activity_in.hall",
-        ];
-        assert_eq!(fields, expected);
-        assert_eq!(SocialMapper::new(config).unwrap_err(), problems);
-    }
-}
+mod tests;

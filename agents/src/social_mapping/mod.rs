@@ -19,6 +19,7 @@ pub mod gaussian;
 pub mod graph;
 pub mod groups;
 pub mod layers;
+pub mod limits;
 pub mod map;
 pub mod object_space;
 pub mod personal;

@@ -2,6 +2,7 @@
 //! READING.md items 9 and 11). This file owns the shapes and R(t); both are closed form, and R(t)
 //! stays within its bounds whatever the agenda.
 
+use super::limits::{DURATIONS, MOST_COST, MOST_LENGTH, is_length};
 use super::preset::{Named, Preset, named_or_table};
 use dsr::Time;
 use nalgebra::{Isometry2, Point2, Vector2};
@@ -22,12 +23,11 @@ pub enum Outline {
 }
 
 impl Outline {
-    /// Whether its lengths are finite and not negative.
+    /// Whether its lengths are from 0 to [`MOST_LENGTH`].
     pub fn is_valid(&self) -> bool {
-        let valid = |length: f64| length.is_finite() && length >= 0.0;
         match self {
-            Self::Rectangle(size) => valid(size.x) && valid(size.y),
-            Self::Circle(radius) => valid(*radius),
+            Self::Rectangle(size) => is_length(size.x) && is_length(size.y),
+            Self::Circle(radius) => is_length(*radius),
         }
     }
 
@@ -81,9 +81,9 @@ impl Space {
     /// The authors' margin for a table, a bed or a stretcher, round or not (READING.md item 11).
     pub const USED_AROUND: Self = Self::Margin(0.5);
 
-    /// Whether its lengths are finite and positive and it does not open to the rear.
+    /// Whether its lengths are above 0 and at most [`MOST_LENGTH`], and it does not open to the rear.
     pub fn is_valid(&self) -> bool {
-        let valid = |length: f64| length.is_finite() && length > 0.0;
+        let valid = |length: f64| length > 0.0 && length <= MOST_LENGTH;
         match self {
             Self::Trapezoid {
                 depth,
@@ -265,16 +265,16 @@ impl UsageCurve {
         }
     }
 
-    /// Whether it rises from a cost of at least 1, in finite time.
+    /// Whether it rises from a cost of at least 1 to one of at most [`MOST_COST`], in [`DURATIONS`].
     pub fn is_valid(&self) -> bool {
-        let positive = |x: f64| x.is_finite() && x > 0.0;
+        let sound = |steps: Steps| {
+            steps.rise > 0.0 && steps.rise <= MOST_COST && DURATIONS.contains(&steps.every)
+        };
         self.least >= 1.0
             && self.most >= self.least
-            && self.most.is_finite()
-            && positive(self.ramp)
-            && self
-                .steps
-                .is_none_or(|steps| positive(steps.rise) && positive(steps.every))
+            && self.most <= MOST_COST
+            && DURATIONS.contains(&self.ramp)
+            && self.steps.is_none_or(sound)
     }
 
     /// R(`now`) of an object with this agenda. Where activities overlap or follow closely, the one

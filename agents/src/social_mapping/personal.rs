@@ -37,7 +37,7 @@ impl CooperationZone {
     }
 
     pub(super) fn is_valid(&self) -> bool {
-        self.direction.is_finite() && self.opening > 0.0 && self.opening <= 2.0 * PI
+        self.direction.abs() <= 2.0 * PI && self.opening > 0.0 && self.opening <= 2.0 * PI
     }
 }
 

@@ -4,6 +4,7 @@
 
 use super::features::FeatureError;
 use super::groups::TooCrowded;
+use super::limits::{LARGEST_BODY, MOST_LENGTH, MOST_SPEED};
 use super::object_space::{Agenda, EndsBeforeStart, Outline};
 use dsr::Time;
 use nalgebra::{Isometry2, Point2, Vector2};
@@ -124,7 +125,7 @@ pub enum SceneError {
         index: usize,
     },
     /// The robot's radius is not a length.
-    #[error("the robot's radius is {radius} m")]
+    #[error("the robot's radius is {radius} m, where it may be from 0 m to {LARGEST_BODY} m")]
     RobotRadius {
         /// As given.
         radius: f64,
@@ -144,13 +145,15 @@ pub enum Rejection {
         name: String,
     },
     /// The person counts as standing still.
-    #[error("person {name} is taken to stand still: the velocity is not finite")]
+    #[error(
+        "person {name} is taken to stand still: the velocity is none of up to {MOST_SPEED} m/s"
+    )]
     PersonVelocity {
         /// The person.
         name: String,
     },
     /// The person has the radius [`BODY_RADIUS`].
-    #[error("person {name} is given the usual radius: {radius} m is none")]
+    #[error("person {name} is given the usual radius: {radius} m is none up to {LARGEST_BODY} m")]
     PersonRadius {
         /// The person.
         name: String,
@@ -159,7 +162,8 @@ pub enum Rejection {
     },
     /// The object is left out.
     #[error(
-        "object {name} is ignored: its pose is no place within {FARTHEST:e} m, or its size no length"
+        "object {name} is ignored: its pose is no place within {FARTHEST:e} m, or its size none of up to \
+         {MOST_LENGTH} m"
     )]
     Object {
         /// The object.
@@ -247,7 +251,7 @@ impl SocialScene {
         if ((xmax - xmin) / resolution).ceil() * ((ymax - ymin) / resolution).ceil() > MOST_CELLS {
             return Err(SceneError::TooLarge { bounds, resolution });
         }
-        if !(self.robot_radius.is_finite() && self.robot_radius >= 0.0) {
+        if !(0.0..=LARGEST_BODY).contains(&self.robot_radius) {
             return Err(SceneError::RobotRadius {
                 radius: self.robot_radius,
             });
@@ -272,11 +276,11 @@ impl SocialScene {
                 continue;
             }
             let mut sound = Cow::Borrowed(person);
-            if !person.velocity.iter().all(|v| v.is_finite()) {
+            if !person.velocity.iter().all(|v| v.abs() <= MOST_SPEED) {
                 rejected.push(Rejection::PersonVelocity { name: name() });
                 sound.to_mut().velocity = Vector2::zeros();
             }
-            if !(person.radius.is_finite() && person.radius > 0.0) {
+            if !(person.radius > 0.0 && person.radius <= LARGEST_BODY) {
                 rejected.push(Rejection::PersonRadius {
                     name: name(),
                     radius: person.radius,

@@ -301,7 +301,7 @@ fn a_graph_that_tells_too_little_is_an_error_that_says_what_is_missing() {
     );
     assert_eq!(
         report(&|centre| centre.set("robot", "radius", f64::NAN)),
-        "the robot's radius is NaN m",
+        "the robot's radius is NaN m, where it may be from 0 m to 10 m",
     );
 }
 

@@ -2,10 +2,12 @@
 //! summed, and who stand in one region above the threshold, linked by neighbours, are a group.
 
 use super::super::gaussian::AsymmetricGaussian;
+use super::super::limits::{MOST_FIGURE, MOST_LENGTH};
 use super::mesh::Mesh;
 use super::union::Union;
 use nalgebra::{Isometry2, Point2};
 use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
 
 /// The paper's thresholds; it prints none of them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -40,9 +42,13 @@ const STEP: f64 = 0.05;
 impl GaussianClustering {
     pub(super) fn is_valid(&self) -> bool {
         self.shape.is_valid()
-            && [self.distance, self.field_of_view, self.neighbours]
-                .iter()
-                .all(|x| x.is_finite() && *x > 0.0)
+            && [
+                (self.distance, MOST_LENGTH),
+                (self.field_of_view, PI),
+                (self.neighbours, MOST_FIGURE),
+            ]
+            .into_iter()
+            .all(|(x, most)| x > 0.0 && x <= most)
     }
 
     /// `phi = 1 + k delta` (eq. 7), delta being what a neighbour at the full distance ahead adds

@@ -2,6 +2,7 @@
 //! mesh. It sees pairs, which TG's triangles cannot, and it expects people to stand closer where it
 //! is crowded, so one set of figures serves a sparse street and a full coffee break.
 
+use super::super::limits::MOST_FIGURE;
 use super::crowd::Crowd;
 use super::mesh::Mesh;
 use nalgebra::{Isometry2, Point2, Vector2};
@@ -47,8 +48,8 @@ pub struct Facing {
 
 impl Facing {
     pub(super) fn is_valid(&self) -> bool {
-        let not_negative = |x: f64| x.is_finite() && x >= 0.0;
-        self.bond.is_finite()
+        let not_negative = |x: f64| (0.0..=MOST_FIGURE).contains(&x);
+        self.bond.abs() <= MOST_FIGURE
             && [
                 self.facing,
                 self.turned_away,
@@ -58,8 +59,7 @@ impl Facing {
             ]
             .into_iter()
             .all(not_negative)
-            && self.crowd_radius.is_finite()
-            && self.crowd_radius > 0.0
+            && CROWD_RADII.contains(&self.crowd_radius)
     }
 
     /// The bond of two, given how crowded it is around them.
@@ -118,6 +118,8 @@ impl Facing {
 }
 
 const MOST_ROUNDS: usize = 50;
+/// Who is around is asked for each pair, metres.
+const CROWD_RADII: std::ops::RangeInclusive<f64> = 1e-3..=10.0;
 /// A gain below this is rounding.
 const LEAST_GAIN: f64 = 1e-9;
 

@@ -2,6 +2,7 @@
 //! a group where its sides are short and all three orientation vectors end in it. Such a group cannot be
 //! two people; that is the paper's rule, and this method is there to compare with.
 
+use super::super::limits::{MOST_LENGTH, is_length};
 use super::mesh::Mesh;
 use super::union::Union;
 use nalgebra::{Isometry2, Point2};
@@ -31,8 +32,7 @@ impl Default for Triangulation {
 
 impl Triangulation {
     pub(super) fn is_valid(&self) -> bool {
-        let finite = self.longest_side.is_finite() && self.vector.is_finite();
-        finite && self.longest_side > 0.0 && self.vector >= 0.0
+        self.longest_side > 0.0 && self.longest_side <= MOST_LENGTH && is_length(self.vector)
     }
 
     /// The groups of people with finite poses, as indices in order.

@@ -295,11 +295,11 @@ fn bad_items_are_left_out_or_mended_and_always_reported() {
     let reports: Vec<String> = map.rejected.iter().map(ToString::to_string).collect();
     expect_test::expect![[r"
         person ghost is ignored: the pose is no place within 1e8 m
-        person ana is taken to stand still: the velocity is not finite
-        person ana is given the usual radius: -1 m is none
+        person ana is taken to stand still: the velocity is none of up to 100 m/s
+        person ana is given the usual radius: -1 m is none up to 10 m
         person voyager is ignored: the pose is no place within 1e8 m
-        object hole is ignored: its pose is no place within 1e8 m, or its size no length
-        object flat is ignored: its pose is no place within 1e8 m, or its size no length
+        object hole is ignored: its pose is no place within 1e8 m, or its size none of up to 1000 m
+        object flat is ignored: its pose is no place within 1e8 m, or its size none of up to 1000 m
         an activity uses plant, which the map does not have or which has no space
         an activity uses hole, which the map does not have or which has no space
         an activity with plant is ignored: the activity ends at 1800000000.000 s, before it starts at 1800000001.000 s
