@@ -248,9 +248,9 @@ pub(crate) struct Store {
     /// Acknowledge every commit only once it is on disk
     #[arg(long, requires = "state")]
     pub(crate) durable: bool,
-    /// Start from a graph that a supervisor saved, instead of the scenario's
-    #[arg(long, value_name = "FILE")]
-    pub(crate) restore: Option<PathBuf>,
+    /// Begin anew, also where a store that was killed left its graph in memory
+    #[arg(long)]
+    pub(crate) fresh: bool,
     /// Tell the agents to do without social behaviour
     #[arg(long)]
     pub(crate) no_social: bool,

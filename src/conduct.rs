@@ -4,7 +4,7 @@
 
 use crate::progress::Progress;
 use crate::supervise::{Hold, Notice, Policy, Program, SuperviseError, Supervisor};
-use dsr::{Image, Instance, ReadError, Session, Snapshot, Subscriber, Tick, Time};
+use dsr::{Instance, ReadError, Session, Snapshot, Subscriber, Tick, Time};
 use executive::{Mission, MissionStatus};
 use scenarios::process::{TICK, TRUTH, tick_time};
 use scenarios::{Scenario, Truth};
@@ -123,19 +123,6 @@ fn run(
     ended.then(|| conductor.finish()).transpose()
 }
 
-/// The store's rescue: saves the graph as this process still sees it, for the next store.
-fn rescue(session: &mut Session) -> Result<Vec<OsString>, String> {
-    let path = session.instance().folder().join("graph.image");
-    // A store that died before it showed its graph was not written to: what the one before it left
-    // is still the newest.
-    if session.epoch().is_ok() || !path.exists() {
-        let image = session.read(Image::of).map_err(|error| error.to_string())?;
-        std::fs::write(&path, image.to_bytes())
-            .map_err(|error| format!("{}: {error}", path.display()))?;
-    }
-    Ok(vec!["--restore".into(), path.into()])
-}
-
 impl<'a> Conductor<'a> {
     fn start(
         settings: &'a Settings<'a>,
@@ -220,7 +207,7 @@ impl<'a> Conductor<'a> {
         Program {
             name: "store".to_owned(),
             arguments,
-            policy: Policy::RestartWithGraph,
+            policy: Policy::Restart,
         }
     }
 
@@ -274,12 +261,9 @@ impl<'a> Conductor<'a> {
     fn until_ready(&mut self, index: usize) -> Result<(), ConductError> {
         let mut notices = Vec::new();
         let interrupted = self.interrupted;
-        let outcome = self.supervisor.wait_until_ready(
-            index,
-            &mut || rescue(&mut self.session),
-            &mut notices,
-            &|| interrupted.load(Ordering::Acquire),
-        );
+        let outcome = self
+            .supervisor
+            .wait_until_ready(index, &mut notices, &|| interrupted.load(Ordering::Acquire));
         self.tell(notices);
         Ok(outcome?)
     }
@@ -305,13 +289,9 @@ impl<'a> Conductor<'a> {
             };
             for &member in &order {
                 let mut notices = Vec::new();
-                let outcome = self.supervisor.take_turn(
-                    member,
-                    tick,
-                    &mut || rescue(&mut self.session),
-                    &mut notices,
-                    &|| interrupted.load(Ordering::Acquire),
-                );
+                let outcome = self.supervisor.take_turn(member, tick, &mut notices, &|| {
+                    interrupted.load(Ordering::Acquire)
+                });
                 self.tell(notices);
                 outcome?;
             }
@@ -334,8 +314,7 @@ impl<'a> Conductor<'a> {
                 if left.is_zero() {
                     break;
                 }
-                let mut rescue = || rescue(&mut self.session);
-                let heard = self.supervisor.hear(left, &mut rescue, &mut notices);
+                let heard = self.supervisor.hear(left, &mut notices);
                 self.tell(std::mem::take(&mut notices));
                 heard?;
             }

@@ -123,6 +123,11 @@ impl Snapshot {
             segment.push(word);
         }
         arena.attach(0, Segment::on_heap(segment.into()));
+        Self::of_arena(Arc::new(arena))
+    }
+
+    /// The newest version in an arena, whoever wrote it.
+    pub(crate) fn of_arena(arena: Arc<Arena>) -> Result<Self, ReadError> {
         arena.epoch().ok_or(ReadError::Damaged { address: 0 })?;
         let root = arena.newest_root()?;
         let damaged = ReadError::Damaged {
@@ -130,7 +135,7 @@ impl Snapshot {
         };
         let bytes = record::read_blob(&arena, root.schema).map_err(|_| damaged)?;
         let schema: Schema = postcard::from_bytes(&bytes).map_err(|_| damaged)?;
-        Ok(Self::new(Arc::new(arena), root, Arc::new(schema)))
+        Ok(Self::new(arena, root, Arc::new(schema)))
     }
 
     /// The snapshot with what owners give out beside the graph.

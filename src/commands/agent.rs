@@ -45,7 +45,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     };
     let taken_part = take_part(arguments, &instance, pace);
     if pace == Pace::Alone {
-        instance.remove_if_unused().map_err(Failure::internal)?;
+        instance.leave().map_err(Failure::internal)?;
     }
     taken_part.map(|()| Answer::Yes)
 }

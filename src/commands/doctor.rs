@@ -6,7 +6,6 @@ use crate::{Answer, Failure};
 use dsr::Instance;
 use serde_json::{Value, json};
 use std::fs;
-use std::os::unix::fs::{MetadataExt, PermissionsExt};
 
 /// Where the graph lies.
 const SHARED_MEMORY: &str = "/dev/shm";
@@ -119,11 +118,10 @@ fn runtime_folder() -> Result<Option<Finding>, Failure> {
     let Some(folder) = any.folder().parent() else {
         return Ok(None);
     };
-    let Ok(metadata) = fs::symlink_metadata(folder) else {
+    if fs::symlink_metadata(folder).is_err() {
         return Ok(None);
-    };
-    let mine = metadata.uid() == rustix::process::getuid().as_raw();
-    let wrong = !metadata.is_dir() || !mine || metadata.permissions().mode() & 0o077 != 0;
+    }
+    let wrong = any.check_folder().is_err();
     let mend = "it must be a folder of yours with mode 700: remove it, or set CORTEX_RUNTIME_DIR";
     Ok(Some(Finding::new(
         "runtime folder",
@@ -147,12 +145,24 @@ fn look_at(instance: &Instance, mend: bool) -> Result<Finding, Failure> {
     }
     let processes = instance.processes().map_err(Failure::internal)?;
     let open = instance.open_to_others().map_err(Failure::internal)?;
-    let wrong = match open.first() {
-        Some(path) => Some(format!("other users can open {}", path.display())),
-        None if processes.is_empty() => Some("no process of it runs; it was left over".to_owned()),
-        None => None,
+    let orphaned = instance.orphaned().map_err(Failure::internal)?;
+    let close = "cortex doctor --mend";
+    let (found, mend) = match (open.first(), orphaned) {
+        (Some(path), _) => (
+            format!("other users can open {}", path.display()),
+            Some(close),
+        ),
+        (None, Some(version)) => (
+            format!("its store was killed and left version {version} of its graph"),
+            Some(
+                "cortex store goes on with it; where no process runs, cortex doctor --mend removes it",
+            ),
+        ),
+        (None, None) if processes.is_empty() => (
+            "no process of it runs; it was left over".to_owned(),
+            Some(close),
+        ),
+        (None, None) => (format!("{} processes", processes.len()), None),
     };
-    let mend = wrong.is_some().then_some("cortex doctor --mend");
-    let found = wrong.unwrap_or_else(|| format!("{} processes", processes.len()));
     Ok(Finding::new(&check, found, mend))
 }

@@ -22,7 +22,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     };
     let served = serve(arguments, &instance, pace);
     if pace == Pace::Alone {
-        instance.remove_if_unused().map_err(Failure::internal)?;
+        instance.leave().map_err(Failure::internal)?;
     }
     served.map(|()| Answer::Yes)
 }
@@ -76,8 +76,8 @@ pub(super) fn check_state(
     Ok(())
 }
 
-/// Fills the empty graph: with what a supervisor saved of the store before this one, else with what
-/// is on disk, brought in line with the scenario, else with the scenario's.
+/// Fills the empty graph: with what a store that was killed left in memory, else with what is on disk,
+/// brought in line with the scenario, else with the scenario's.
 fn begin(
     store: &mut Store,
     arguments: &Arguments,
@@ -85,16 +85,15 @@ fn begin(
     grammar: &Grammar,
     state: Option<&State>,
 ) -> Result<(), Failure> {
-    if let Some(path) = &arguments.restore {
-        let bytes = std::fs::read(path).map_err(Failure::input)?;
-        let image: Image = dsr::decode_image(&bytes).map_err(Failure::input)?;
-        store.restore(&image).map_err(Failure::internal)?;
+    let saved = state.map(State::load).transpose().map_err(Failure::input)?;
+    let saved = saved.flatten();
+    if let Some(image) = orphaned(store, arguments, saved.as_ref())? {
+        store.restore(&image).map_err(no_way_on)?;
         go_by_published(store)?;
-        tracing::info!("restored version {}", image.version());
+        tracing::info!("version {} goes on from memory", image.version());
         return Ok(());
     }
-    let saved = state.map(State::load).transpose().map_err(Failure::input)?;
-    let mut first = match saved.flatten() {
+    let mut first = match saved {
         Some(image) => {
             store.restore(&image).map_err(Failure::input)?;
             tracing::info!("version {} goes on from disk", image.version());
@@ -112,6 +111,38 @@ fn begin(
     let committed = store.commit(&first, scenario.start);
     committed.map_err(Failure::internal)?;
     Ok(())
+}
+
+/// What a store that was killed left in memory, where this one is to go on with it. What is on disk of
+/// the same graph is never newer, unless it went on elsewhere.
+fn orphaned(
+    store: &Store,
+    arguments: &Arguments,
+    saved: Option<&Image>,
+) -> Result<Option<Image>, Failure> {
+    if arguments.fresh {
+        return Ok(None);
+    }
+    let Some(image) = store.orphaned().map_err(no_way_on)? else {
+        return Ok(None);
+    };
+    match saved {
+        Some(saved) if saved.lineage() != image.lineage() => Err(no_way_on(format!(
+            "a store that was killed left version {} of a graph in memory, and the state folder \
+             has another graph",
+            image.version()
+        ))),
+        Some(saved) if saved.version() > image.version() => Ok(None),
+        _ => Ok(Some(image)),
+    }
+}
+
+/// What a killed store left stands in the way.
+fn no_way_on(error: impl std::fmt::Display) -> Failure {
+    Failure::input_with_help(
+        error,
+        "`cortex store --fresh` begins without what the killed store left in memory",
+    )
 }
 
 /// Goes by the rules that the graph has: those that were loaded while the system ran. Whether it has

@@ -42,8 +42,6 @@ pub(crate) enum SuperviseError {
         what: &'static str,
         log: String,
     },
-    #[error("cannot restart the store: {0}")]
-    Store(String),
     #[error("interrupted")]
     Interrupted,
 }
@@ -64,8 +62,6 @@ pub(crate) struct Program {
 pub(crate) enum Policy {
     /// Starts it again.
     Restart,
-    /// Starts it again with the graph as it was; see [`Supervisor::restarts_of_store`].
-    RestartWithGraph,
     /// Ends the run.
     EndRun,
 }
@@ -83,9 +79,6 @@ struct Member {
     /// CPU seconds of lives that have ended.
     spent: f64,
 }
-
-/// Gives the arguments that a restarted store starts with: where it finds the graph as it was.
-pub(crate) type Rescue<'a> = dyn FnMut() -> Result<Vec<OsString>, String> + 'a;
 
 #[derive(Debug)]
 pub(crate) struct Supervisor {
@@ -139,26 +132,19 @@ impl Supervisor {
             spent: 0.0,
         };
         self.members.push(member);
-        self.spawn(index, &[])?;
+        self.spawn(index)?;
         Ok(index)
     }
 
-    fn spawn(&mut self, index: usize, extra: &[OsString]) -> Result<(), SuperviseError> {
+    fn spawn(&mut self, index: usize) -> Result<(), SuperviseError> {
         self.generation += 1;
         let member = &mut self.members[index];
         let log = self.logs.join(format!("{}.log", member.program.name));
-        let arguments: Vec<OsString> = member
-            .program
-            .arguments
-            .iter()
-            .chain(extra)
-            .cloned()
-            .collect();
         member.ready = false;
         let send = self.send.clone();
         let child = Child::spawn(
             &self.executable,
-            &arguments,
+            &member.program.arguments,
             &log,
             index,
             self.generation,
@@ -186,20 +172,16 @@ impl Supervisor {
     pub(crate) fn wait_until_ready(
         &mut self,
         index: usize,
-        rescue: &mut Rescue<'_>,
         notices: &mut Vec<Notice>,
         interrupted: &dyn Fn() -> bool,
     ) -> Result<(), SuperviseError> {
-        self.wait(index, "join", rescue, notices, interrupted, |member| {
-            member.ready
-        })
+        self.wait(index, "join", notices, interrupted, |member| member.ready)
     }
 
     fn wait(
         &mut self,
         index: usize,
         what: &'static str,
-        rescue: &mut Rescue<'_>,
         notices: &mut Vec<Notice>,
         interrupted: &dyn Fn() -> bool,
         mut enough: impl FnMut(&Member) -> bool,
@@ -217,7 +199,7 @@ impl Supervisor {
                     log: self.log_hint(index),
                 });
             }
-            self.hear(Duration::from_millis(50), rescue, notices)?;
+            self.hear(Duration::from_millis(50), notices)?;
         }
         Ok(())
     }
@@ -226,21 +208,15 @@ impl Supervisor {
     pub(crate) fn hear(
         &mut self,
         patience: Duration,
-        rescue: &mut Rescue<'_>,
         notices: &mut Vec<Notice>,
     ) -> Result<(), SuperviseError> {
         match self.events.recv_timeout(patience) {
-            Ok(event) => self.take_note(event, rescue, notices),
+            Ok(event) => self.take_note(event, notices),
             Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => Ok(()),
         }
     }
 
-    fn take_note(
-        &mut self,
-        event: Event,
-        rescue: &mut Rescue<'_>,
-        notices: &mut Vec<Notice>,
-    ) -> Result<(), SuperviseError> {
+    fn take_note(&mut self, event: Event, notices: &mut Vec<Notice>) -> Result<(), SuperviseError> {
         let member = &mut self.members[event.member];
         let Some(child) = member
             .child
@@ -262,7 +238,7 @@ impl Supervisor {
                 let (status, spent) = child.reap();
                 member.spent += spent;
                 member.child = None;
-                self.restart(event.member, status, rescue, notices)
+                self.restart(event.member, status, notices)
             }
         }
     }
@@ -271,7 +247,6 @@ impl Supervisor {
         &mut self,
         index: usize,
         status: Option<ExitStatus>,
-        rescue: &mut Rescue<'_>,
         notices: &mut Vec<Notice>,
     ) -> Result<(), SuperviseError> {
         let status = status.map_or_else(|| "no status".to_owned(), |status| status.to_string());
@@ -290,16 +265,10 @@ impl Supervisor {
         if recent.filter(|at| at.elapsed() < RESTART_WINDOW).count() >= RESTARTS {
             return Err(SuperviseError::KeepsEnding { process, log });
         }
-        let with_graph = member.program.policy == Policy::RestartWithGraph;
         notices.push(Notice(format!(
             "{process} ended ({status}) and is restarted"
         )));
-        let extra = if with_graph {
-            rescue().map_err(SuperviseError::Store)?
-        } else {
-            Vec::new()
-        };
-        self.spawn(index, &extra)
+        self.spawn(index)
     }
 
     /// Gives the process a turn and waits until it has taken it; one that dies in its turn is
@@ -308,32 +277,24 @@ impl Supervisor {
         &mut self,
         index: usize,
         tick: Tick,
-        rescue: &mut Rescue<'_>,
         notices: &mut Vec<Notice>,
         interrupted: &dyn Fn() -> bool,
     ) -> Result<(), SuperviseError> {
         let done = done_line(tick.index);
         let done = done.trim_end();
         loop {
-            self.wait_until_ready(index, rescue, notices, interrupted)?;
+            self.wait_until_ready(index, notices, interrupted)?;
             let lives = self.members[index].restarts.len();
             if let Some(child) = &mut self.members[index].child {
                 child.give_turn(tick);
             }
-            self.wait(
-                index,
-                "take its turn",
-                rescue,
-                notices,
-                interrupted,
-                |member| {
-                    member.restarts.len() > lives
-                        || member
-                            .child
-                            .as_ref()
-                            .is_some_and(|child| child.has_said(done))
-                },
-            )?;
+            self.wait(index, "take its turn", notices, interrupted, |member| {
+                member.restarts.len() > lives
+                    || member
+                        .child
+                        .as_ref()
+                        .is_some_and(|child| child.has_said(done))
+            })?;
             if self.members[index].restarts.len() == lives {
                 return Ok(());
             }

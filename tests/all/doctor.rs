@@ -77,7 +77,10 @@ fn the_doctor_finds_and_mends_what_was_left_and_what_is_open_and_leaves_the_livi
     living.wait().unwrap();
     let (finding, code) = told(runtime.path(), name, &[]);
     assert!(
-        finding["found"].as_str().unwrap().contains("left over"),
+        finding["found"]
+            .as_str()
+            .unwrap()
+            .contains("left version 1 of its graph"),
         "{finding}"
     );
     assert_eq!(code, Some(1));

@@ -1,6 +1,6 @@
 //! The graph on disk, when everything is killed: what was called durable is there again, whole.
 
-use crate::support::{Process, Program, TestInstance};
+use crate::support::{Process, Program, TestInstance, within};
 use dsr::{Session, Time, Transaction, Value, Version};
 use std::collections::BTreeMap;
 use std::process::{Child, Stdio};
@@ -194,9 +194,9 @@ fn a_durable_commit_is_refused_where_the_store_keeps_no_state() {
 struct ByHand(Child);
 
 impl ByHand {
-    fn start(instance: &TestInstance, state: &str, rest: &[&str]) -> Self {
+    fn start(instance: &TestInstance, rest: &[&str]) -> Self {
         let scenario = "scenarios/care-centre";
-        let mut arguments = vec!["store", "--scenario", scenario, "--state", state];
+        let mut arguments = vec!["store", "--scenario", scenario];
         arguments.extend(["--instance", instance.name()]);
         arguments.extend(rest);
         let child = Program::command(&arguments)
@@ -226,7 +226,7 @@ fn a_store_by_hand_goes_on_from_its_folder_and_says_what_is_wrong_with_another()
     let state = folder.path().join("state");
     let state = state.to_str().unwrap();
     let instance = TestInstance::new("by-hand");
-    let store = ByHand::start(&instance, state, &["--durable"]);
+    let store = ByHand::start(&instance, &["--state", state, "--durable"]);
     let mut session = Session::attach(&instance.0, "cortex-graph", PATIENCE).unwrap();
     let mut transaction = Transaction::new();
     transaction.create_node("tv", "screen", vec![]);
@@ -254,7 +254,7 @@ fn a_store_by_hand_goes_on_from_its_folder_and_says_what_is_wrong_with_another()
     assert!(said.contains("is in use by another store"), "{said}");
     drop((store, session));
     instance.0.remove().unwrap();
-    let store = ByHand::start(&instance, state, &[]);
+    let store = ByHand::start(&instance, &["--state", state]);
     let mut session = Session::attach(&instance.0, "cortex-graph", PATIENCE).unwrap();
     let snapshot = session.snapshot().unwrap();
     assert!(snapshot.version() > commit.version);
@@ -282,4 +282,61 @@ fn a_store_by_hand_goes_on_from_its_folder_and_says_what_is_wrong_with_another()
     let foreign = ["run", "scenarios/plaza", "--state", "docs"];
     let said = refused(&[&foreign[..], &named].concat());
     assert!(said.contains("not a state folder"), "{said}");
+}
+
+#[test]
+fn a_store_by_hand_that_was_killed_leaves_its_graph_to_the_next_by_hand() {
+    let instance = TestInstance::new("left");
+    let store = ByHand::start(&instance, &[]);
+    let mut session = Session::attach(&instance.0, "cortex-graph", PATIENCE).unwrap();
+    let set = |session: &mut Session, speed: f64| {
+        let mut transaction = Transaction::new();
+        transaction.set("robot", "max_speed", speed);
+        session.commit(&transaction, Time::default()).unwrap()
+    };
+    let commit = set(&mut session, 0.123);
+    let epoch = session.epoch().unwrap();
+    let renewed = |session: &mut Session| {
+        let new = within(PATIENCE, || (session.epoch().ok()? != epoch).then_some(()));
+        assert!(new.is_some(), "the new store does not show itself");
+    };
+    drop(store);
+    let store = ByHand::start(&instance, &[]);
+    renewed(&mut session);
+    // To the byte, while somebody looks on.
+    assert_eq!(session.snapshot().unwrap().version(), commit.version);
+    let last = set(&mut session, 0.124);
+    assert_eq!(last.version, Version(commit.version.0 + 1));
+    drop((store, session));
+    // And where nobody does: what a person asks of it removes nothing.
+    let said = refused(&["graph", "show", "--instance", instance.name()]);
+    assert!(
+        said.contains(&format!("version {}", last.version)),
+        "{said}"
+    );
+    let store = ByHand::start(&instance, &[]);
+    let mut session = Session::attach(&instance.0, "cortex-graph", PATIENCE).unwrap();
+    assert_eq!(session.snapshot().unwrap().version(), last.version);
+    drop((store, session));
+    // A folder with another graph is not written over, and may be meant.
+    let folder = TempDir::new().unwrap();
+    let state = folder.path().join("state");
+    let state = state.to_str().unwrap();
+    let other = TestInstance::new("left-too");
+    let store = ByHand::start(&other, &["--state", state, "--durable"]);
+    let mut session = Session::attach(&other.0, "cortex-graph", PATIENCE).unwrap();
+    let kept = set(&mut session, 0.2);
+    drop((store, session));
+    let second = ["store", "--scenario", "scenarios/care-centre"];
+    let flags = ["--instance", instance.name(), "--state", state];
+    let said = refused(&[&second[..], &flags].concat());
+    assert!(
+        said.contains("another graph") && said.contains("--fresh"),
+        "{said}"
+    );
+    let store = ByHand::start(&instance, &["--state", state, "--fresh"]);
+    let mut session = Session::attach(&instance.0, "cortex-graph", PATIENCE).unwrap();
+    assert!(session.snapshot().unwrap().version() > kept.version);
+    assert_eq!(instance.0.orphaned().unwrap(), None);
+    drop((store, session));
 }

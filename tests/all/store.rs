@@ -3,8 +3,8 @@
 
 use crate::support::{Process, TestInstance, pause, within};
 use dsr::{
-    CommitError, Image, LeaseError, LeaseRefusal, Manifest, ReadError, Refusal, Schema, Session,
-    Snapshot, Store, Time, Transaction, Value, Version,
+    CommitError, LeaseError, LeaseRefusal, Manifest, ReadError, Refusal, Schema, Session, Snapshot,
+    Store, Time, Transaction, Value, Version,
 };
 use std::process::Command;
 use std::time::Duration;
@@ -115,8 +115,6 @@ fn a_lease_ends_with_its_time_and_with_the_process_that_has_it() {
 #[test]
 fn no_commit_is_lost_or_applied_twice_however_often_the_store_is_killed() {
     let instance = TestInstance::new("once");
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("graph.image");
     let mut store = Process::peer("store", &instance);
     let mut session = Session::attach(&instance.0, "watch", PATIENCE).unwrap();
     let clients = ["a", "b"].map(|name| Process::start("append", &instance, &[name]));
@@ -128,10 +126,9 @@ fn no_commit_is_lost_or_applied_twice_however_often_the_store_is_killed() {
         assert!(moved.is_some(), "nothing is committed in round {round}");
         store.kill();
         let epoch = session.epoch().unwrap();
-        let image = Image::of(&session.snapshot().unwrap()).unwrap();
-        std::fs::write(&path, image.to_bytes()).unwrap();
-        store = Process::start("store", &instance, &[path.to_str().unwrap()]);
-        assert_eq!(store.line(), "ready");
+        let left = session.snapshot().unwrap().version();
+        assert_eq!(instance.0.orphaned().unwrap(), Some(left));
+        store = Process::peer("store", &instance);
         let new = within(PATIENCE, || (session.epoch().ok()? != epoch).then_some(()));
         assert!(new.is_some(), "the new store does not show itself");
     }
@@ -306,6 +303,16 @@ fn a_graph_grows_while_readers_that_came_before_go_on_reading() {
     let segment = 256 << 20;
     assert!(largest.max() > Some(segment), "it fits in one segment");
     assert_eq!(session.snapshot().unwrap().node_count(), nodes as u64);
+    // A store that is killed leaves all its segments to the next.
+    let (left, epoch) = (
+        session.snapshot().unwrap().version(),
+        session.epoch().unwrap(),
+    );
+    store.kill();
+    let store = Process::peer("store", &instance);
+    let new = within(PATIENCE, || (session.epoch().ok()? != epoch).then_some(()));
+    assert!(new.is_some(), "the new store does not show itself");
+    assert_eq!(session.snapshot().unwrap().version(), left);
     // Who was there before it grew, who comes after, and this one count the same.
     let late = Process::start("sum", &instance, &[]);
     for reader in [early, late] {

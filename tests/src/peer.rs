@@ -38,7 +38,7 @@ fn main() -> Outcome {
         "large-watch" => large::watch(&instance),
         "hot-store" => hot_store(&instance),
         "hot-owner" => hot_owner(&instance),
-        "store" => store(&instance, rest.first()),
+        "store" => store(&instance),
         "join" => join(&instance),
         "store-with-state" => store_with_state(&instance, rest),
         "write-durable" => write_durable(&instance, number(0)?),
@@ -70,10 +70,10 @@ fn end_of_input() -> Arc<AtomicBool> {
 }
 
 /// Serves; from an image, if there is one.
-fn store(instance: &Instance, image: Option<&String>) -> Outcome {
+fn store(instance: &Instance) -> Outcome {
     let mut store = Store::open(instance, Schema::open())?;
-    if let Some(path) = image {
-        store.restore(&dsr::decode_image(&std::fs::read(path)?)?)?;
+    if let Some(image) = store.orphaned()? {
+        store.restore(&image)?;
     }
     // Little history, so that memory of old versions is reused under slow readers.
     store.graph_mut().set_limits(dsr::Limits {

@@ -22,9 +22,9 @@ use rustix::mm::{Advice, madvise};
 use std::sync::{Arc, PoisonError, RwLock};
 
 /// log2 of the words in a segment: 256 MiB.
-const SHIFT: u32 = 25;
+pub(super) const SHIFT: u32 = 25;
 /// Segments that an arena may grow to: 4 GiB in all. Each costs every process some 4 KiB.
-const CAPACITY: usize = 16;
+pub(super) const CAPACITY: usize = 16;
 
 // SAFETY: a word is an `AtomicU64`: no pointer, no padding, any bits are a valid value, and
 // `repr(transparent)` fixes its layout for every process on the host.

@@ -1,6 +1,7 @@
 //! What a store does for its instance beside its work: it removes what processes that were killed left,
 //! and makes sure of the memory of those that live. This file guarantees that nobody waits long for what a dead process was about to make, that its places
-//! in the services are free again, and that nothing is taken from a process that lives.
+//! in the services are free again, and that nothing is taken from a process that lives; nor is the graph of a
+//! store that was killed, see the file `orphan`.
 //!
 //! iceoryx2 cleans up after a process that has ended, but not where it was killed at a bad moment:
 //!
@@ -10,6 +11,7 @@
 //! - A node without its details, which say where its files are: it is looked for elsewhere.
 
 use super::gate::Gate;
+use super::orphan;
 use super::{InstanceError, Ipc, IpcNode, ROOM, ipc, memory_of, room_for};
 use iceoryx2::config::Config;
 use iceoryx2::node::{DeadNodeView, NodeView};
@@ -41,14 +43,14 @@ const OF_NOBODY: [&str; 2] = [".dynamic", ".global_mgmt"];
 
 /// The processes whose ids are in the name of a file. iceoryx2 counts up an id of 128 bits, the time in the
 /// lower half, and above it the process.
-fn processes_in(name: &str) -> impl Iterator<Item = u32> {
+pub(super) fn processes_in(name: &str) -> impl Iterator<Item = u32> {
     name.split(['.', '_'])
         .filter_map(|part| part.parse::<u128>().ok())
         .map(|id| (id >> 64) as u32)
         .filter(|process| *process != 0)
 }
 
-fn name_of(path: &Path) -> &str {
+pub(super) fn name_of(path: &Path) -> &str {
     path.file_name()
         .and_then(|name| name.to_str())
         .unwrap_or_default()
@@ -85,7 +87,7 @@ impl Members {
     }
 
     /// Whether the process has ended, if it ever was a member.
-    fn has_ended(&self, process: u32) -> bool {
+    pub(super) fn has_ended(&self, process: u32) -> bool {
         !self.alive.contains(&process) && !self.unclear.contains(&process)
     }
 
@@ -154,6 +156,7 @@ pub(super) fn clean<G>(
     config: &Config,
     enter: impl Fn() -> Option<G>,
 ) -> Result<(usize, usize), InstanceError> {
+    orphan::keep(config)?;
     let members = Members::of(config)?;
     // Whoever is known to be dead makes nothing any more.
     remove_half_made(config, |_| true);
@@ -219,7 +222,7 @@ fn entries(folder: &Path) -> impl Iterator<Item = PathBuf> + use<> {
 }
 
 /// Removes a file, or a folder with all in it. What cannot be removed is found again.
-fn remove(path: &Path) {
+pub(super) fn remove(path: &Path) {
     tracing::debug!("{} was left by a process that was killed", path.display());
     let removed = if path.is_dir() {
         fs::remove_dir_all(path)

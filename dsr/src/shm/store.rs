@@ -3,11 +3,13 @@
 
 mod answer;
 mod desks;
+mod durable;
 mod news;
 
 use super::arena::ArenaPublisher;
 use super::lease::Landlord;
 use super::leftovers::Cleaner;
+use super::orphan::{Orphan, OrphanError};
 use super::presence::Names;
 use super::session::{ANSWERS, CHANGES, NEWS, REQUESTS_EVENT, Request, event, requests};
 use super::{Instance, InstanceError, Ipc, IpcNode, Publisher, bell, ipc, now, pause, wait};
@@ -15,8 +17,8 @@ use crate::arena::allocator::Full;
 use crate::graph::{Image, STORE};
 use crate::state::Keeper;
 use crate::{
-    Change, Commit, Durability, Epoch, Graph, Refusal, Schema, State, StateError, Time,
-    Transaction, TransactionId, Version,
+    Change, Commit, Durability, Epoch, Graph, Refusal, Schema, StateError, Time, Transaction,
+    TransactionId, Version,
 };
 use answer::{Answered, reply};
 use desks::Desks;
@@ -47,6 +49,9 @@ pub enum StoreError {
     /// The operating system gave no thread.
     #[error("the state cannot be kept: {0}")]
     Thread(std::io::Error),
+    /// What a killed store left cannot be read.
+    #[error(transparent)]
+    Orphan(#[from] OrphanError),
     /// The operating system gave no thread.
     #[error("what dead processes leave cannot be removed: {0}")]
     Cleaner(std::io::Error),
@@ -130,7 +135,8 @@ impl Store {
         // A store that was killed has left its ports behind, which count.
         let cleaner = Cleaner::start(&node).map_err(StoreError::Cleaner)?;
         let arena = ArenaPublisher::open(&node)?;
-        let epoch = new_epoch();
+        let before = Orphan::find(node.config())?.map(|orphan| orphan.epoch());
+        let epoch = new_epoch().max(before.map_or(Epoch(0), |before| Epoch(before.0 + 1)));
         let (memory, growth) = arena.arena(epoch);
         let graph =
             Graph::on(memory, growth, schema, epoch).map_err(|Full| StoreError::OutOfMemory)?;
@@ -182,6 +188,19 @@ impl Store {
         })
     }
 
+    /// The graph of the store before this one, if that was killed and its memory is still there: its last
+    /// committed version. It stays there until this store serves for the first time.
+    ///
+    /// # Errors
+    /// [`StoreError::Orphan`] where it cannot be read.
+    pub fn orphaned(&self) -> Result<Option<Image>, StoreError> {
+        let Some(orphan) = Orphan::find(self.node.config())? else {
+            return Ok(None);
+        };
+        let image = Image::of(&orphan.read()?).map_err(OrphanError::from)?;
+        Ok(Some(image))
+    }
+
     /// Fills the empty graph with what another store's memory held; versions go on from there.
     ///
     /// # Errors
@@ -189,37 +208,6 @@ impl Store {
     pub fn restore(&mut self, image: &Image) -> Result<(), StoreError> {
         self.graph.restore(image)?;
         self.last_time = self.graph.snapshot().time();
-        Ok(())
-    }
-
-    /// From now on keeps the graph in a state folder, which first becomes what the graph is now.
-    ///
-    /// A commit that asks for it, or every one where `durability` is [`Durability::OnDisk`] and
-    /// it does not ask for less, is acknowledged once it is on disk. The others get there within
-    /// about `interval`.
-    ///
-    /// # Errors
-    /// [`StoreError::State`] where the folder cannot be written to, or holds a newer version.
-    pub fn keep(
-        &mut self,
-        mut state: State,
-        interval: Duration,
-        durability: Durability,
-    ) -> Result<(), StoreError> {
-        let snapshot = self.graph.snapshot();
-        state.replace(&Image::of(&snapshot).map_err(StateError::from)?)?;
-        let bell = event(&self.node, REQUESTS_EVENT)?
-            .notifier_builder()
-            .create()
-            .map_err(|e| ipc("the state's bell", e))?;
-        let bell = move || {
-            if let Err(error) = bell.notify() {
-                tracing::debug!("waking the store: {error}");
-            }
-        };
-        let keeper = Keeper::start(state, &snapshot, interval, Box::new(bell));
-        self.keeper = Some(keeper.map_err(StoreError::Thread)?);
-        self.durability = durability;
         Ok(())
     }
 
@@ -303,50 +291,6 @@ impl Store {
     /// faster, zero burns nothing.
     pub fn set_spin(&mut self, spin: Duration) {
         self.spin = spin;
-    }
-
-    /// Whether the commit is to be acknowledged only once it is on disk.
-    fn durability_of(&self, transaction: &Transaction) -> bool {
-        let asked = match transaction.durability {
-            Durability::AsTheStore => self.durability,
-            other => other,
-        };
-        asked == Durability::OnDisk
-    }
-
-    fn can_keep(&self) -> Result<(), Refusal> {
-        let refused = |reason: &str| Err(Refusal::NotDurable(reason.to_owned()));
-        match &self.keeper {
-            None => refused("the store keeps no state; start it with --state"),
-            Some(keeper) => keeper.failure().map_or(Ok(()), refused),
-        }
-    }
-
-    /// Tells those who waited for it that their commits are on disk, or that they will not be.
-    fn answer_waiting(&mut self) -> Result<usize, InstanceError> {
-        let Some(keeper) = self.keeper.as_ref().filter(|_| !self.waiting.is_empty()) else {
-            return Ok(0);
-        };
-        // Looked at before what is durable: what was written before a failure counts.
-        let failed = keeper.failure().is_some();
-        let durable = keeper.durable();
-        let before = self.waiting.len();
-        let (told, waiting) = std::mem::take(&mut self.waiting)
-            .into_iter()
-            .partition(|asker| failed || asker.last <= durable);
-        self.waiting = waiting;
-        let told: Vec<Waiting> = told;
-        for asker in told {
-            if let Some(answered) = self.answered.get_mut(&asker.client)
-                && answered.sequence == asker.sequence
-            {
-                for commit in answered.answers.iter_mut().flatten() {
-                    commit.durable = commit.version <= durable;
-                }
-                reply(&asker.request, &answered.answers, &mut self.scratch)?;
-            }
-        }
-        Ok(before - self.waiting.len())
     }
 
     /// Answers every request that has come, waiting up to `patience` for the first. How many.

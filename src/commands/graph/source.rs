@@ -7,7 +7,9 @@ use crate::commands::output::tell;
 use crate::commands::{instance, read_text};
 use crate::recording;
 use dsr::interchange::{self, Format, World};
-use dsr::{Commit, Graph, NodeId, NodeRef, Schema, Session, Snapshot, Time, Transaction, json};
+use dsr::{
+    AttachError, Commit, Graph, NodeId, NodeRef, Schema, Session, Snapshot, Time, Transaction, json,
+};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -154,7 +156,15 @@ pub(crate) fn attach(name: &str) -> Result<Session, Failure> {
     if !instance.exists() {
         return Err(crate::commands::not_running(name));
     }
-    Session::attach(&instance, crate::manifests::TERMINAL, PATIENCE).map_err(Failure::internal)
+    let attached = Session::attach(&instance, crate::manifests::TERMINAL, PATIENCE);
+    attached.map_err(|error| match (&error, instance.orphaned()) {
+        (AttachError::NoStore { .. }, Ok(Some(version))) => Failure::input_with_help(
+            format!("the store of instance `{name}` was killed"),
+            format!("`cortex store` goes on with what it left, version {version} of its graph"),
+        ),
+        (AttachError::NoStore { .. }, _) => Failure::input(error),
+        _ => Failure::internal(error),
+    })
 }
 
 /// Reads a world file; what was left out of it is told.
