@@ -238,6 +238,10 @@ pub(crate) struct Agent {
 }
 
 #[derive(Debug, Clone, Args)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "each is a flag of the command line"
+)]
 pub(crate) struct Store {
     /// Folder of the scenario that the graph starts from
     #[arg(long, value_name = "DIR")]

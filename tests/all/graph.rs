@@ -1,7 +1,7 @@
 //! The shared graph between real processes: what one reads while another writes, what a reader
 //! costs, and what happens when somebody dies.
 
-use crate::support::{Process, TestInstance};
+use crate::support::{Process, TestInstance, within};
 use dsr::{
     EdgeRef, Filter, Image, Schema, Session, Store, Time, Transaction, Update, Value, Version,
 };
@@ -166,10 +166,11 @@ fn a_killed_store_is_replaced_without_losing_a_commit_and_agents_find_the_new_on
     }
     let old = session.epoch().unwrap();
     store.kill();
-    // What the supervisor does: what this process still sees goes to the new store.
-    let image = Image::of(&session.snapshot().unwrap()).unwrap();
-    assert_eq!(image.version(), Version(51));
+    // What it left is all that this process still sees.
+    assert_eq!(instance.0.orphaned().unwrap(), Some(Version(51)));
     let mut store = Store::open(&instance.0, Schema::open()).unwrap();
+    let image = store.orphaned().unwrap().unwrap();
+    assert_eq!(image, Image::of(&session.snapshot().unwrap()).unwrap());
     store.restore(&image).unwrap();
     // Until the new store shows its graph, the old one is read.
     assert_eq!(session.epoch().unwrap(), old);
@@ -205,6 +206,82 @@ fn a_killed_store_is_replaced_without_losing_a_commit_and_agents_find_the_new_on
         EdgeRef::new("n0", "next", "n49").to_string(),
         "`n0` -next-> `n49`"
     );
+    drop((session, store));
+}
+
+#[test]
+fn who_follows_hears_every_commit_across_restarts_of_the_store_and_of_another_graph() {
+    let instance = TestInstance::new("follows");
+    let mut store = Process::peer("store", &instance);
+    let mut session = Session::attach(&instance.0, "agent", PATIENCE).unwrap();
+    let mut changes = session.changes(Filter::default()).unwrap();
+    let mut late = session.changes(Filter::default()).unwrap();
+    let schema = Schema::open();
+    let hear = |changes: &mut dsr::Changes| {
+        within(PATIENCE, || changes.next(&schema).unwrap()).expect("nothing is heard")
+    };
+    let make = |session: &mut Session, name: &str| {
+        let mut transaction = Transaction::new();
+        transaction.create_node("thing", name, vec![]);
+        let commit = session.commit(&transaction, Time::default()).unwrap();
+        commit.version
+    };
+    for round in 0..4 {
+        // The first after a restart too: the graph goes on.
+        for i in 0..3 {
+            let version = make(&mut session, &format!("n{round}_{i}"));
+            let Update::Change(change) = hear(&mut changes) else {
+                panic!("a gap before {version}")
+            };
+            assert_eq!(change.version, version);
+        }
+        store.kill();
+        store = Process::peer("store", &instance);
+    }
+    // What nobody had taken when its store ended is told as a gap, without another commit.
+    let last = session.snapshot().unwrap().version();
+    let mut gaps = 0;
+    let told = within(PATIENCE, || {
+        session.epoch().unwrap();
+        match late.next(&schema).unwrap()? {
+            Update::Gap(version) => {
+                gaps += 1;
+                (version == last).then_some(())
+            }
+            Update::Change(change) => (change.version == last).then_some(()),
+        }
+    });
+    assert!(told.is_some() && gaps > 0, "{gaps} gaps");
+    store.kill();
+    // One that begins another graph, at the version that follows on what was heard last.
+    let mut store = Store::open(&instance.0, Schema::open()).unwrap();
+    while store.graph_mut().snapshot().version() < last {
+        let mut transaction = Transaction::new();
+        let name = store.graph_mut().snapshot().version().to_string();
+        transaction.create_node("thing", &name, vec![]);
+        store.commit(&transaction, Time::default()).unwrap();
+    }
+    let old = session.epoch().unwrap();
+    let version = std::thread::scope(|scope| {
+        let made = scope.spawn(|| {
+            while session.epoch().unwrap() == old {
+                std::thread::yield_now();
+            }
+            make(&mut session, "n0_0")
+        });
+        while !made.is_finished() {
+            store.serve(Duration::from_millis(5)).unwrap();
+        }
+        made.join().unwrap()
+    });
+    assert_eq!(version, Version(last.0 + 1));
+    for mut changes in [changes, late] {
+        let first = changes.next(&schema).unwrap();
+        assert!(
+            matches!(first, Some(Update::Gap(_))),
+            "another graph: {first:?}"
+        );
+    }
     drop((session, store));
 }
 

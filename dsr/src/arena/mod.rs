@@ -81,7 +81,7 @@ pub enum ReadError {
 }
 
 pub(crate) const MAGIC: u64 = u64::from_le_bytes(*b"cortexG1");
-pub(crate) const FORMAT: u64 = 8;
+pub(crate) const FORMAT: u64 = 9;
 
 /// Header words of segment 0.
 mod at {
@@ -92,6 +92,7 @@ mod at {
     pub(super) const OLDEST: usize = 4;
     pub(super) const SEGMENTS: usize = 5;
     pub(super) const BELL: usize = 6;
+    pub(super) const FIRST: usize = 7;
     /// On another cache line than the head: who asks reads it, and shall not slow the next commit.
     pub(super) const ASLEEP: usize = 8;
     pub(super) const LEASES: usize = 16;
@@ -179,6 +180,7 @@ impl Arena {
         put(at::FORMAT, FORMAT);
         put(at::EPOCH, epoch.0);
         put(at::SEGMENTS, self.attached() as u64);
+        put(at::FIRST, self.head());
         // Version 0, the empty graph, is the root of zeros that the ring holds already.
         if let Some(word) = self.header(at::MAGIC) {
             word.store_release(MAGIC);
@@ -201,6 +203,12 @@ impl Arena {
         if let Some(word) = self.header(at::SEGMENTS) {
             word.store_release(count);
         }
+    }
+
+    /// The version that the store showed first: the last of the store before it, if it goes on with the
+    /// graph of one.
+    pub(crate) fn first_shown(&self) -> u64 {
+        self.header(at::FIRST).map_or(0, Word::load)
     }
 
     /// The word that a process sleeps on until the store has answered or committed something.

@@ -25,6 +25,8 @@ pub struct Changes {
     pub(super) current: Current,
     pub(super) filter: Filter,
     pub(super) epoch: Epoch,
+    /// The first life of the store of the graph that it follows, where that is known.
+    pub(super) lineage: Option<u64>,
     pub(super) seen: Version,
 }
 
@@ -52,6 +54,31 @@ impl Changes {
         }
     }
 
+    /// Follows another store from now on, and tells whether it goes on with the same graph, as far as
+    /// this process sees it.
+    fn turn_to(&mut self, epoch: Epoch) -> bool {
+        let before = self.lineage;
+        self.epoch = epoch;
+        self.lineage = self.current.arena().and_then(|arena| {
+            let root = arena.newest_root().ok()?;
+            (arena.epoch() == Some(epoch)).then_some(root.lineage)
+        });
+        self.lineage.is_some() && self.lineage == before
+    }
+
+    /// What the store before the one that this process sees had committed and was not heard before it
+    /// ended.
+    fn missed(&mut self) -> Option<Update> {
+        let arena = self.current.arena()?;
+        let epoch = arena.epoch().filter(|epoch| *epoch != self.epoch)?;
+        let first = Version(arena.first_shown());
+        if self.turn_to(epoch) && first <= self.seen {
+            return None;
+        }
+        self.seen = first;
+        Some(Update::Gap(first))
+    }
+
     fn fetch(&mut self) -> Result<(), InstanceError> {
         while let Some(changes) = self.subscriber.receive()? {
             self.waiting.extend(changes);
@@ -68,7 +95,7 @@ impl Changes {
             let Some(change) = self.waiting.pop_front() else {
                 match self.subscriber.receive()? {
                     Some(changes) => self.waiting.extend(changes),
-                    None => return Ok(None),
+                    None => return Ok(self.missed()),
                 }
                 continue;
             };
@@ -76,8 +103,8 @@ impl Changes {
             if change.epoch == self.epoch && change.version <= self.seen {
                 continue;
             }
-            let follows = change.version == Version(self.seen.0 + 1);
-            self.epoch = change.epoch;
+            let same = change.epoch == self.epoch || self.turn_to(change.epoch);
+            let follows = same && change.version == Version(self.seen.0 + 1);
             self.seen = change.version;
             if !follows {
                 return Ok(Some(Update::Gap(change.version)));

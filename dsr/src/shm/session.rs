@@ -244,9 +244,13 @@ impl Session {
     /// # Errors
     /// [`AttachError::NoStore`].
     pub fn epoch(&mut self) -> Result<Epoch, AttachError> {
+        self.newest_epoch()?.ok_or_else(|| self.no_store())
+    }
+
+    /// The life of the newest store that a look finds.
+    fn newest_epoch(&mut self) -> Result<Option<Epoch>, InstanceError> {
         self.look()?;
-        let found = self.arena.newest().map(|(epoch, _)| *epoch);
-        found.ok_or_else(|| self.no_store())
+        Ok(self.arena.newest().map(|(epoch, _)| *epoch))
     }
 
     fn no_store(&self) -> AttachError {
@@ -325,15 +329,16 @@ impl Session {
     /// [`AttachError`].
     pub fn changes(&mut self, filter: Filter) -> Result<Changes, AttachError> {
         let subscriber = Subscriber::open(&self.node, CHANGES)?;
-        let epoch = self.epoch()?;
-        let seen = self.snapshot()?.version();
+        let snapshot = self.snapshot()?;
+        let epoch = snapshot.arena.epoch();
         Ok(Changes {
             subscriber,
             waiting: VecDeque::new(),
             current: self.arena.current.clone(),
             filter,
-            epoch,
-            seen,
+            epoch: epoch.ok_or_else(|| self.no_store())?,
+            lineage: Some(snapshot.root.lineage),
+            seen: snapshot.version(),
         })
     }
 

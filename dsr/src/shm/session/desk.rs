@@ -155,8 +155,7 @@ impl Session {
             ring(&self.wake_store);
         }
         // Now that the store has something to do. One that was restarted takes nothing that is for the one before.
-        self.look()?;
-        let newest = self.arena.newest().map(|(epoch, _)| *epoch);
+        let newest = self.newest_epoch()?;
         let Some(desk) = self.desk.as_mut().filter(|_| newest == Some(aim.epoch)) else {
             return Ok(None);
         };
