@@ -195,6 +195,9 @@ pub fn schema(bytes: &[u8]) {
     drop(Schema::from_toml("schema.toml", &text(bytes)));
 }
 
+/// How much is done for the conflicts of a grammar.
+const CONFLICT_EFFORT: u64 = 100_000_000;
+
 /// A grammar: parsed, checked, its defects shown, its rules compared, printed, matched, explained and applied,
 /// those beside broken ones, too. Each is bounded, so that a slow or a large answer is found as such.
 pub fn grammar(bytes: &[u8]) {
@@ -212,7 +215,7 @@ pub fn grammar(bytes: &[u8]) {
     show(diagnostics);
     show(grammar.analyse(None));
     for grammar in sound.iter().chain([&grammar]) {
-        let conflicts = grammar.conflicts();
+        let conflicts = grammar.conflicts(CONFLICT_EFFORT);
         assert!(conflicts.found.len() <= grammar::CONFLICT_LIMIT);
         let conflicts = conflicts.found.into_iter();
         show(conflicts.map(|conflict| conflict.diagnostic).collect());

@@ -88,7 +88,7 @@ mod source;
 mod testing;
 mod unfold;
 
-pub use analysis::{CONFLICT_LIMIT, Conflict, Conflicts, EFFORT_LIMIT, OVERLAY_LIMIT};
+pub use analysis::{CONFLICT_LIMIT, Conflict, Conflicts, EFFORT_LIMIT, OVERLAY_LIMIT, Undecided};
 pub use apply::{ApplyError, CHANGE_LIMIT};
 pub use binding::Binding;
 pub use diagnostic::{Diagnostic, Problem, Severity};

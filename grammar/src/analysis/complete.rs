@@ -1,122 +1,17 @@
-//! A graph in the making: nodes, links and values that rules ask for.
+//! Drafts that meet conditions.
 //!
-//! Guarantee: a draft never has a link that something asked not to be there.
+//! Guarantee: what is said to be known of a condition in a draft stays so however much is drawn yet.
 
+use super::draft::{Draft, Places, owner};
 use crate::{AttributePath, Comparison, Condition, Expression, PatternNode, Types};
-use dsr::{EdgeRef, Transaction, Value};
+use dsr::Value;
 use std::cell::Cell;
-use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
 
 /// How many ways to meet a condition are followed.
 const WAYS: usize = 16;
 /// How many formulas are looked at for one graph, each as often as there are ways to come to it.
-const FORMULAS: usize = 1_000;
-
-pub(super) type Link = (usize, String, usize);
-/// Variables and the nodes of the draft that they stand for.
-pub(super) type Places = BTreeMap<String, usize>;
-
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-enum Owner {
-    Node(usize),
-    Link(Link),
-}
-
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Draft {
-    /// Names and types.
-    pub(super) nodes: Vec<(String, String)>,
-    pub(super) links: BTreeSet<Link>,
-    pub(super) absent: BTreeSet<Link>,
-    values: BTreeMap<(Owner, String), Value>,
-}
-
-impl Draft {
-    /// What makes this graph.
-    pub(super) fn transaction(&self) -> Transaction {
-        let name = |index: usize| self.nodes[index].0.as_str();
-        let mut transaction = Transaction::new();
-        for (name, type_name) in &self.nodes {
-            transaction.create_node(type_name, name, Vec::new());
-        }
-        for (from, label, to) in &self.links {
-            transaction.create_edge(name(*from), label, name(*to));
-        }
-        for ((owner, attribute), value) in &self.values {
-            match owner {
-                Owner::Node(node) => transaction.set(name(*node), attribute, value.clone()),
-                Owner::Link((from, label, to)) => {
-                    let edge = EdgeRef::new(name(*from), label, name(*to));
-                    transaction.set_on_edge(edge, attribute, value.clone());
-                }
-            }
-        }
-        transaction
-    }
-
-    /// As patterns are written.
-    pub(super) fn words(&self) -> String {
-        let name = |index: usize| self.nodes[index].0.as_str();
-        let mut words: Vec<String> = self
-            .nodes
-            .iter()
-            .map(|(name, type_name)| format!("{name}:{type_name}"))
-            .collect();
-        for (from, label, to) in &self.links {
-            words.push(format!("{}->{}({label})", name(*from), name(*to)));
-        }
-        for ((owner, attribute), value) in &self.values {
-            let owner = match owner {
-                Owner::Node(node) => name(*node).to_owned(),
-                Owner::Link((from, label, to)) => {
-                    format!("e({}, {label}, {})", name(*from), name(*to))
-                }
-            };
-            words.push(format!(
-                "{owner}.{attribute}={}",
-                crate::matching::words(value)
-            ));
-        }
-        words.join(" ")
-    }
-
-    /// A name that no node has yet.
-    pub(super) fn fresh(&self, name: &str) -> String {
-        let mut fresh = name.to_owned();
-        while self.nodes.iter().any(|(known, _)| *known == fresh) {
-            fresh.push_str("_2");
-        }
-        fresh
-    }
-
-    fn with_link(mut self, link: Link, there: bool) -> Vec<Self> {
-        let (wanted, other) = if there {
-            (&mut self.links, &self.absent)
-        } else {
-            (&mut self.absent, &self.links)
-        };
-        if other.contains(&link) {
-            return Vec::new();
-        }
-        wanted.insert(link);
-        vec![self]
-    }
-
-    fn with_value(mut self, owner: (Owner, String), value: Value) -> Vec<Self> {
-        match self.values.get(&owner) {
-            Some(known) if *known != value => return Vec::new(),
-            _ => {}
-        }
-        if let Owner::Link(link) = &owner.0 {
-            if self.absent.contains(link) {
-                return Vec::new();
-            }
-            self.links.insert(link.clone());
-        }
-        self.values.insert(owner, value);
-        vec![self]
-    }
-}
+const FORMULAS: usize = 500;
 
 /// Finds ways to make conditions come out one way or the other, and so that little would change it.
 pub(super) struct Ways<'t> {
@@ -160,13 +55,13 @@ impl<'t> Ways<'t> {
     fn all(&self, draft: Draft, places: &Places, condition: &Condition, holds: bool) -> Vec<Draft> {
         match (condition, holds) {
             (Condition::Edge { label, from, to }, _) => {
-                let (Some(&from), Some(&to)) = (places.get(&**from), places.get(&**to)) else {
+                let (Some(from), Some(to)) = (places.get(from), places.get(to)) else {
                     return vec![draft];
                 };
-                draft.with_link((from, label.to_string(), to), holds)
+                draft.with_link((from, Rc::from(&**label), to), holds)
             }
             (Condition::Same(a, b), _) => {
-                let same = places.get(&**a) == places.get(&**b);
+                let same = places.get(a) == places.get(b);
                 if same == holds {
                     vec![draft]
                 } else {
@@ -255,7 +150,7 @@ impl<'t> Ways<'t> {
                 found.push(draft.clone());
                 let mut only = vec![draft.clone()];
                 for (_, other) in self.chosen(draft, places, variables, false) {
-                    if other != chosen {
+                    if !other.nodes().eq(chosen.nodes()) {
                         let more = only.into_iter();
                         let more = more.flat_map(|d| self.to(d, &other, body, !holds));
                         only = more.take(WAYS).collect();
@@ -306,6 +201,75 @@ impl<'t> Ways<'t> {
         drafts
     }
 
+    /// Whether a condition holds in the draft, as far as it is drawn; where `whole`, what is not drawn is not there. What
+    /// is known of a part stays so however much is drawn yet.
+    pub(super) fn known(
+        &self,
+        draft: &Draft,
+        places: &Places,
+        condition: &Condition,
+        whole: bool,
+    ) -> Option<bool> {
+        let known = |condition| self.known(draft, places, condition, whole);
+        match condition {
+            Condition::Edge { label, from, to } => {
+                let link = (places.get(from)?, Rc::from(&**label), places.get(to)?);
+                if draft.links.contains(&link) {
+                    return Some(true);
+                }
+                (whole || draft.absent.contains(&link)).then_some(false)
+            }
+            Condition::Same(a, b) => Some(places.get(a)? == places.get(b)?),
+            Condition::Compare {
+                operator,
+                left,
+                right,
+            } => {
+                let value = |expression: &Expression| match expression {
+                    Expression::Literal(literal) => Ok(literal.value()),
+                    Expression::Attribute(path) => {
+                        let value = owner(path, places).and_then(|at| draft.values.get(&at));
+                        value.cloned().ok_or(whole)
+                    }
+                    Expression::Arithmetic { .. } => Err(false),
+                };
+                match (value(left), value(right)) {
+                    (Ok(left), Ok(right)) => Some(operator.holds(&left, &right)),
+                    // A comparison with what is not there does not hold.
+                    (Err(true), _) | (_, Err(true)) => Some(false),
+                    _ => None,
+                }
+            }
+            Condition::Not(inner) => known(inner).map(|holds| !holds),
+            Condition::And(all) => every(all.iter().map(known)),
+            Condition::Or(any) => {
+                every(any.iter().map(|one| known(one).map(|holds| !holds))).map(|none| !none)
+            }
+            Condition::When {
+                condition,
+                consequence,
+            } => match (known(condition), known(consequence)) {
+                (Some(false), _) | (_, Some(true)) => Some(true),
+                (Some(true), Some(false)) => Some(false),
+                _ => None,
+            },
+            Condition::Exists { variables, body } | Condition::Forall { variables, body } => {
+                let exists = matches!(condition, Condition::Exists { .. });
+                let all = self.chosen(draft.clone(), places, variables, false);
+                let each = all.iter().map(|(draft, places)| {
+                    let holds = self.known(draft, places, body, whole)?;
+                    Some(holds != exists)
+                });
+                match every(each) {
+                    Some(false) => Some(exists),
+                    // There may be more nodes, or more of these than were looked at.
+                    Some(true) if whole && all.len() < WAYS * WAYS => Some(!exists),
+                    _ => None,
+                }
+            }
+        }
+    }
+
     /// The draft with nodes for quantified variables: those that are there and, if `more`, new ones.
     fn chosen(
         &self,
@@ -316,11 +280,12 @@ impl<'t> Ways<'t> {
     ) -> Vec<(Draft, Places)> {
         let mut drafts = vec![(draft, places.clone())];
         for variable in variables {
+            let name: Rc<str> = Rc::from(&*variable.variable);
             let mut next = Vec::new();
             for (draft, places) in drafts {
                 let choose = |node: usize| {
                     let mut places = places.clone();
-                    places.insert(variable.variable.to_string(), node);
+                    places.insert(&name, node);
                     places
                 };
                 for (index, (_, exact)) in draft.nodes.iter().enumerate() {
@@ -330,10 +295,9 @@ impl<'t> Ways<'t> {
                 }
                 if more {
                     let mut wider = draft.clone();
-                    let name = wider.fresh(&variable.variable);
-                    wider.nodes.push((name, variable.type_name.to_string()));
-                    let place = choose(wider.nodes.len() - 1);
-                    next.push((wider, place));
+                    let fresh = wider.fresh(&variable.variable);
+                    let node = wider.add_node(&fresh, &variable.type_name);
+                    next.push((wider, choose(node)));
                 }
             }
             next.truncate(WAYS * WAYS);
@@ -343,29 +307,17 @@ impl<'t> Ways<'t> {
     }
 }
 
-fn owner(path: &AttributePath, places: &Places) -> Option<(Owner, String)> {
-    Some(match path {
-        AttributePath::Node {
-            variable,
-            attribute,
-        } => (
-            Owner::Node(*places.get(&**variable)?),
-            attribute.to_string(),
-        ),
-        AttributePath::Edge {
-            from,
-            label,
-            to,
-            attribute,
-        } => {
-            let link = (
-                *places.get(&**from)?,
-                label.to_string(),
-                *places.get(&**to)?,
-            );
-            (Owner::Link(link), attribute.to_string())
+/// Whether all hold: not where one is known not to, nor to be said where one is not known.
+fn every(all: impl Iterator<Item = Option<bool>>) -> Option<bool> {
+    let mut known = Some(true);
+    for one in all {
+        match one {
+            Some(false) => return Some(false),
+            Some(true) => {}
+            None => known = None,
         }
-    })
+    }
+    known
 }
 
 /// Values that meet a comparison of attributes with each other or with a constant.

@@ -3,8 +3,11 @@
 //! Guarantee: a contradiction is only given where no graph and no binding meets the conditions; where there
 //! are too many cases to look at, none is given.
 
-use super::facts::Facts;
-use crate::{AttributePath, Condition, Expression, Grammar, Name, PatternNode, Rule};
+use super::facts::{Compared, Facts, constant};
+use super::order::Side;
+use crate::{
+    Arithmetic, AttributePath, Condition, Expression, Grammar, Name, Number, PatternNode, Rule,
+};
 use dsr::Schema;
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -201,11 +204,14 @@ impl<'r> Search<'r> {
                 },
                 _,
             ) => {
-                let key = |expression| key(expression, &scope);
-                let (Some(one), Some(other)) = (key(left), key(right)) else {
-                    return None;
+                let compared = |expression| {
+                    Some(Compared {
+                        expression,
+                        key: key(expression, &scope)?,
+                        side: side(expression, &scope)?,
+                    })
                 };
-                let sides = [(&**left, one), (&**right, other)];
+                let sides = [compared(left)?, compared(right)?];
                 return case.facts.compare(*operator, sides, holds, words);
             }
             (Condition::Not(inner), _) => case.asked.push(part(inner, !holds)),
@@ -283,4 +289,52 @@ fn key(expression: &Expression, scope: &Scope) -> Option<String> {
             format!("({} {})", operator.symbol(), operands.join(" "))
         }
     })
+}
+
+/// What an expression adds to what.
+fn side(expression: &Expression, scope: &Scope) -> Option<Side> {
+    if let Some(constant) = constant(expression) {
+        return Some(Side::Constant(constant));
+    }
+    Some(match expression {
+        Expression::Literal(_) => Side::Other,
+        Expression::Attribute(_) => Side::Sum {
+            base: key(expression, scope)?,
+            added: Vec::new(),
+        },
+        Expression::Arithmetic { operator, operands } => {
+            sum(*operator, operands, scope)?.unwrap_or(Side::Other)
+        }
+    })
+}
+
+/// The same for arithmetic, if it is a sum of one attribute and constants.
+fn sum(operator: Arithmetic, operands: &[Expression], scope: &Scope) -> Option<Option<Side>> {
+    let number = |value: &Expression| constant(value).as_ref().and_then(Number::of);
+    let Some(place) = operands.iter().position(|one| constant(one).is_none()) else {
+        return Some(None);
+    };
+    let Side::Sum { base, mut added } = side(&operands[place], scope)? else {
+        return Some(None);
+    };
+    let mut more: Vec<Option<Number>> = Vec::new();
+    match operator {
+        Arithmetic::Add => {
+            if place > 0 {
+                let first: Option<Vec<Number>> = operands[..place].iter().map(number).collect();
+                more.push(first.and_then(|first| operator.compute(&first)));
+            }
+            more.extend(operands[place + 1..].iter().map(number));
+        }
+        Arithmetic::Subtract if place == 0 && operands.len() > 1 => {
+            let negative = |one| Arithmetic::Subtract.compute(&[number(one)?]);
+            more.extend(operands[1..].iter().map(negative));
+        }
+        _ => return Some(None),
+    }
+    let Some(more) = more.into_iter().collect::<Option<Vec<Number>>>() else {
+        return Some(None);
+    };
+    added.extend(more);
+    Some(Some(Side::Sum { base, added }))
 }

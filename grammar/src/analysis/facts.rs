@@ -3,25 +3,26 @@
 //! Guarantee: what is called a contradiction is met by no graph, or by none that the schema allows.
 
 use super::contradiction::Node;
-use crate::{AttributePath, Comparison, Expression, Name};
+use super::order::{Asked, Order, Side};
+use crate::{Arithmetic, AttributePath, Comparison, Expression, Name, Number};
 use dsr::{Schema, Value, ValueKind};
 use std::collections::BTreeMap;
 
 /// Whole numbers beyond are not told apart as reals, so nothing is said of them.
-const EXACT: f64 = 9_007_199_254_740_992.0;
+pub(super) const EXACT: f64 = 9_007_199_254_740_992.0;
 
 /// How two values can stand to each other, a bit each.
-mod relation {
-    pub(super) const LESS: u8 = 1;
-    pub(super) const EQUAL: u8 = 2;
-    pub(super) const GREATER: u8 = 4;
+pub(super) mod relation {
+    pub(in crate::analysis) const LESS: u8 = 1;
+    pub(in crate::analysis) const EQUAL: u8 = 2;
+    pub(in crate::analysis) const GREATER: u8 = 4;
     /// Equal, without order: texts, say.
-    pub(super) const SAME: u8 = 8;
+    pub(in crate::analysis) const SAME: u8 = 8;
     /// Neither equal nor in an order.
-    pub(super) const OTHER: u8 = 16;
+    pub(in crate::analysis) const OTHER: u8 = 16;
     /// One of them is not there.
-    pub(super) const MISSING: u8 = 32;
-    pub(super) const ANY: u8 = 63;
+    pub(in crate::analysis) const MISSING: u8 = 32;
+    pub(in crate::analysis) const ANY: u8 = 63;
 }
 
 use relation::{ANY, EQUAL, GREATER, LESS, MISSING, OTHER, SAME};
@@ -55,22 +56,70 @@ struct Attribute<'r> {
     is_there: bool,
 }
 
+/// How two values may stand to each other, and what says so.
+#[derive(Debug, Clone)]
+struct Pair {
+    sides: [Side; 2],
+    may: u8,
+    words: Vec<String>,
+}
+
+/// One side of a comparison.
+pub(super) struct Compared<'r> {
+    pub(super) expression: &'r Expression,
+    /// The same for what is the same.
+    pub(super) key: String,
+    pub(super) side: Side,
+}
+
 #[derive(Debug, Clone)]
 pub(super) struct Facts<'r> {
     schema: Option<&'r Schema>,
     links: BTreeMap<(Node, &'r str, Node), bool>,
-    /// How the values of two expressions may stand to each other.
-    pairs: BTreeMap<(String, String), u8>,
+    /// Two expressions that are compared.
+    pairs: BTreeMap<(String, String), Pair>,
     attributes: BTreeMap<String, Attribute<'r>>,
+    /// Those that something is added to.
+    bases: BTreeMap<String, &'r AttributePath>,
     /// Two comparisons of the same that cannot both be.
     clash: Option<String>,
 }
 
-fn constant(expression: &Expression) -> Option<Value> {
+/// The value of what names no attribute, if it has one.
+pub(super) fn constant(expression: &Expression) -> Option<Value> {
     match expression {
         Expression::Literal(literal) => Some(literal.value()),
-        _ => None,
+        Expression::Attribute(_) => None,
+        Expression::Arithmetic { operator, operands } => {
+            let numbers = operands.iter().map(|one| Number::of(&constant(one)?));
+            let numbers: Vec<Number> = numbers.collect::<Option<_>>()?;
+            operator.compute(&numbers).and_then(Number::into_value)
+        }
     }
+}
+
+/// An attribute that an expression reads.
+fn path_in(expression: &Expression) -> Option<&AttributePath> {
+    match expression {
+        Expression::Literal(_) => None,
+        Expression::Attribute(path) => Some(path),
+        Expression::Arithmetic { operands, .. } => operands.iter().find_map(path_in),
+    }
+}
+
+/// Whether an expression has a value in no graph: a constant that is no number is reckoned with, or 0 divides.
+fn is_undefined(expression: &Expression) -> bool {
+    let Expression::Arithmetic { operator, operands } = expression else {
+        return false;
+    };
+    let numbers: Vec<Option<Value>> = operands.iter().map(constant).collect();
+    let is_text = |value: &Option<Value>| value.as_ref().is_some_and(|v| Number::of(v).is_none());
+    let is_zero = |value: &Option<Value>| value.as_ref().and_then(Value::as_f64) == Some(0.0);
+    let by_zero = *operator == Arithmetic::Divide && numbers.iter().skip(1).any(is_zero);
+    by_zero
+        || numbers.iter().any(is_text)
+        || operands.iter().any(is_undefined)
+        || numbers.iter().all(Option::is_some) && constant(expression).is_none()
 }
 
 fn mirrored(operator: Comparison) -> Comparison {
@@ -90,6 +139,7 @@ impl<'r> Facts<'r> {
             links: BTreeMap::new(),
             pairs: BTreeMap::new(),
             attributes: BTreeMap::new(),
+            bases: BTreeMap::new(),
             clash: None,
         }
     }
@@ -110,20 +160,28 @@ impl<'r> Facts<'r> {
     pub(super) fn compare(
         &mut self,
         operator: Comparison,
-        [(left, one), (right, other)]: [(&'r Expression, String); 2],
+        [one, other]: [Compared<'r>; 2],
         holds: bool,
         words: impl Fn() -> String,
     ) -> Option<String> {
+        let (left, right) = (one.expression, other.expression);
+        if is_undefined(left) || is_undefined(right) {
+            return holds.then(|| format!("{} never holds: what it reckons has no value", words()));
+        }
         if let (Some(a), Some(b)) = (constant(left), constant(right)) {
             let never = operator.holds(&a, &b) != holds;
             return never.then(|| format!("{} never holds", words()));
         }
-        for (expression, key, with, operator) in [
-            (left, &one, right, operator),
-            (right, &other, left, mirrored(operator)),
-        ] {
-            if let Expression::Attribute(path) = expression {
-                let entry = self.attributes.entry(key.clone());
+        for (compared, with, operator) in
+            [(&one, right, operator), (&other, left, mirrored(operator))]
+        {
+            if let (Side::Sum { base, .. }, Some(path)) =
+                (&compared.side, path_in(compared.expression))
+            {
+                self.bases.insert(base.clone(), path);
+            }
+            if let Expression::Attribute(path) = compared.expression {
+                let entry = self.attributes.entry(compared.key.clone());
                 let attribute = entry.or_insert_with(|| Attribute {
                     path,
                     bounds: Vec::new(),
@@ -142,21 +200,27 @@ impl<'r> Facts<'r> {
                 }
             }
         }
-        let same = one == other;
-        let (key, operator) = if one <= other {
-            ((one, other), operator)
-        } else {
-            ((other, one), mirrored(operator))
+        let same = one.key == other.key;
+        let start = match same {
+            true if self.may_differ_from_itself(left) => EQUAL | SAME | OTHER | MISSING,
+            true => EQUAL | SAME | MISSING,
+            false => ANY,
         };
-        let start = if same {
-            EQUAL | SAME | OTHER | MISSING
+        let (key, sides, operator) = if one.key <= other.key {
+            ((one.key, other.key), [one.side, other.side], operator)
         } else {
-            ANY
+            let operator = mirrored(operator);
+            ((other.key, one.key), [other.side, one.side], operator)
         };
-        let may = self.pairs.entry(key).or_insert(start);
+        let pair = self.pairs.entry(key).or_insert_with(|| Pair {
+            sides,
+            may: start,
+            words: Vec::new(),
+        });
+        pair.words.push(words());
         let wanted = relations(operator);
-        *may &= if holds { wanted } else { ANY ^ wanted };
-        if *may != 0 {
+        pair.may &= if holds { wanted } else { ANY ^ wanted };
+        if pair.may != 0 {
             return None;
         }
         if same {
@@ -168,11 +232,41 @@ impl<'r> Facts<'r> {
         None
     }
 
+    /// Whether a value can be other than itself: one that is no number in a real, or in a list of reals.
+    fn may_differ_from_itself(&self, expression: &Expression) -> bool {
+        let Expression::Attribute(path) = expression else {
+            return false;
+        };
+        let Some(declared) = self.schema.and_then(|schema| declared(schema, path)) else {
+            return true;
+        };
+        use ValueKind::{Bool, F32, F64, I32, I64, String, U32, U64};
+        match declared.kind {
+            Some(Bool | String | I32 | U32 | I64 | U64) => false,
+            Some(F32 | F64) => declared.min.is_none() && declared.max.is_none(),
+            _ => true,
+        }
+    }
+
     /// Why no value of some attribute meets all that is asked of it.
     pub(super) fn contradiction(&self) -> Option<String> {
         let mut attributes = self.attributes.values();
         let by_bounds = attributes.find_map(|attribute| attribute.contradiction(self.schema));
-        by_bounds.or_else(|| self.clash.clone())
+        let by_pairs = by_bounds.or_else(|| self.clash.clone());
+        by_pairs.or_else(|| self.order().contradiction())
+    }
+
+    /// All comparisons together.
+    fn order(&self) -> Order<'_> {
+        let asked = self.pairs.iter().map(|((one, other), pair)| Asked {
+            keys: [one, other],
+            sides: pair.sides.each_ref(),
+            may: pair.may,
+            words: &pair.words,
+        });
+        Order::new(asked.collect(), |key| {
+            declared(self.schema?, self.bases.get(key)?)
+        })
     }
 }
 
@@ -218,7 +312,7 @@ fn number(value: &Value) -> Option<f64> {
     value.as_f64().filter(|number| number.abs() < EXACT)
 }
 
-fn numeric(kind: ValueKind) -> bool {
+pub(super) fn numeric(kind: ValueKind) -> bool {
     use ValueKind::{F32, F64, I32, I64, U32, U64};
     matches!(kind, I32 | U32 | I64 | U64 | F32 | F64)
 }

@@ -2,7 +2,7 @@
 //!
 //! Guarantee: it agrees with [`Types::is_subtype`](crate::Types::is_subtype), at the cost of a few words.
 
-use crate::Grammar;
+use crate::{Condition, Effect, Grammar, Rule};
 use std::collections::BTreeMap;
 
 /// A type's number.
@@ -86,4 +86,47 @@ impl<'g> Kinds<'g> {
         both.find(|(_, word)| *word != 0)
             .map(|(index, word)| 64 * index + word.trailing_zeros() as usize)
     }
+}
+
+/// The types that a rule names.
+pub(super) fn types_of(rule: &Rule) -> impl Iterator<Item = &str> {
+    let nodes = rule
+        .bound_nodes()
+        .chain(&rule.parameters)
+        .chain(&rule.right.nodes);
+    let mut names: Vec<&str> = nodes.map(|node| &*node.type_name).collect();
+    let mut conditions: Vec<&Condition> = rule.precondition.iter().collect();
+    let mut effects: Vec<&Effect> = rule.effect.iter().collect();
+    while let Some(effect) = effects.pop() {
+        match effect {
+            Effect::Create { type_name, .. } | Effect::Retype { type_name, .. } => {
+                names.push(type_name);
+            }
+            Effect::Forall { variables, body } => {
+                names.extend(variables.iter().map(|node| &*node.type_name));
+                effects.extend(body);
+            }
+            Effect::When { condition, body } => {
+                conditions.push(condition);
+                effects.extend(body);
+            }
+            _ => {}
+        }
+    }
+    while let Some(condition) = conditions.pop() {
+        match condition {
+            Condition::Not(inner) => conditions.push(inner),
+            Condition::And(all) | Condition::Or(all) => conditions.extend(all),
+            Condition::Exists { variables, body } | Condition::Forall { variables, body } => {
+                names.extend(variables.iter().map(|node| &*node.type_name));
+                conditions.push(body);
+            }
+            Condition::When {
+                condition,
+                consequence,
+            } => conditions.extend([&**condition, &**consequence]),
+            Condition::Edge { .. } | Condition::Same(..) | Condition::Compare { .. } => {}
+        }
+    }
+    names.into_iter()
 }

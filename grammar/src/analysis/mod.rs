@@ -7,14 +7,16 @@
 mod complete;
 mod conflict;
 mod contradiction;
+mod draft;
 mod facts;
 mod kinds;
 mod manifest;
 mod never;
+mod order;
 mod reach;
 mod unused;
 
-pub use conflict::{CONFLICT_LIMIT, Conflict, Conflicts, EFFORT_LIMIT, OVERLAY_LIMIT};
+pub use conflict::{CONFLICT_LIMIT, Conflict, Conflicts, EFFORT_LIMIT, OVERLAY_LIMIT, Undecided};
 
 use crate::parser::Finding;
 use crate::{Diagnostic, Grammar, Name, Problem, SourceFile};
@@ -101,12 +103,13 @@ impl Grammar {
     /// applied the second does not match there any more. A rule can disable another match of
     /// itself.
     ///
-    /// The graph is the smallest overlay of the two left sides, completed by what preconditions ask for.
-    /// Of rules so large that there are more than [`OVERLAY_LIMIT`] ways to lay one over the other, the
-    /// others are not looked at. No more than [`CONFLICT_LIMIT`] are given, and all together may take no more than
-    /// [`EFFORT_LIMIT`]; pairs of rules that are left then are counted.
-    pub fn conflicts(&self) -> Conflicts {
-        conflict::conflicts(self)
+    /// The graph is the smallest overlay of the two left sides, completed by what preconditions ask for. At most
+    /// [`OVERLAY_LIMIT`] ways to lay one over the other are looked at. No more than [`CONFLICT_LIMIT`] are given. All
+    /// together may take no more than `effort`, of which each pair of rules has an equal share at first; what some
+    /// leave is for the others. With [`EFFORT_LIMIT`] that is at most some ten seconds. Of which pairs it was not
+    /// found out is told.
+    pub fn conflicts(&self, effort: u64) -> Conflicts {
+        conflict::conflicts(self, effort)
     }
 }
 

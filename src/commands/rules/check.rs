@@ -1,6 +1,6 @@
 //! `cortex rules check`: everything that is wrong or suspicious, and where.
 
-use super::{diagnostics_json, read, warn};
+use super::{clipped, put_diagnostics, read, warn};
 use crate::commands::graph::read_graph;
 use crate::commands::output::{print, print_json, tell};
 use crate::commands::read_text;
@@ -44,11 +44,13 @@ fn check_goal(file: &Path, as_json: bool) -> Result<Answer, Failure> {
     let name = file.display().to_string();
     let goal = grammar::parse_goal(&read_text(file)?, &name, &grammar::Types::default());
     if as_json {
-        let diagnostics = match &goal {
-            Ok(_) => Vec::new(),
-            Err(defects) => diagnostics_json(&defects.diagnostics),
-        };
-        print_json(&json!({ "diagnostics": diagnostics, "conflicts": [], "conflicts_left": 0 }))?;
+        let mut object = json!({ "conflicts": [], "undecided": [], "conflicts_left": 0 });
+        let defects = goal.as_ref().err();
+        put_diagnostics(
+            &mut object,
+            defects.map_or(&[], |defects| &defects.diagnostics),
+        );
+        print_json(&object)?;
     }
     let goal = goal.map_err(|defects| Failure::Input(defects.into()))?;
     if !as_json {
@@ -56,6 +58,46 @@ fn check_goal(file: &Path, as_json: bool) -> Result<Answer, Failure> {
         print(&format!("{name}: a goal, {nodes} nodes, {links} links\n"))?;
     }
     Ok(Answer::Yes)
+}
+
+/// What is found out of conflicts where they were not asked for: of a twentieth of the time at most.
+const UNASKED_EFFORT: u64 = grammar::EFFORT_LIMIT / 20;
+/// So many pairs of rules that were not decided are told to a person.
+const TOLD: usize = 10;
+
+fn conflicts_json(conflicts: &Conflicts) -> Result<serde_json::Value, Failure> {
+    let row = |conflict: &Conflict| {
+        Ok(json!({
+            "first": conflict.first, "second": conflict.second,
+            "message": clipped(&conflict.diagnostic.to_string()), "graph": smallest(conflict)?,
+        }))
+    };
+    let rows = conflicts.found.iter().map(row);
+    let rows = rows.collect::<Result<Vec<_>, Failure>>()?;
+    let undecided = conflicts.undecided.iter();
+    let undecided = undecided.map(
+        |(first, second, why)| json!({"first": first, "second": second, "reason": why.to_string()}),
+    );
+    Ok(json!({
+        "conflicts": rows, "undecided": undecided.collect::<Vec<_>>(),
+        "conflicts_left": conflicts.left,
+    }))
+}
+
+/// Says of which rules it is not known whether one can disable the other, and why.
+fn tell_undecided(conflicts: &Conflicts) {
+    let left = conflicts.left;
+    let pairs = if left == 1 { "pair" } else { "pairs" };
+    let mut text = format!(
+        "note: of {left} {pairs} of rules it was not found out whether one can disable the other:\n"
+    );
+    for (first, second, why) in conflicts.undecided.iter().take(TOLD) {
+        text.push_str(&format!("  `{first}` and `{second}`: {why}\n"));
+    }
+    if left > TOLD {
+        text.push_str(&format!("  and {} more\n", left - TOLD));
+    }
+    tell(&text);
 }
 
 pub(super) fn check(
@@ -89,37 +131,24 @@ pub(super) fn check(
         analysed.extend(unreachable.map_err(Failure::internal)?);
     }
     diagnostics.extend(analysed);
-    let found = if conflicts || as_json {
-        grammar.conflicts()
-    } else {
-        Conflicts::default()
+    let found = match (conflicts, as_json) {
+        (true, _) => grammar.conflicts(grammar::EFFORT_LIMIT),
+        (false, true) => grammar.conflicts(UNASKED_EFFORT),
+        (false, false) => Conflicts::default(),
     };
-    let Conflicts { found, left } = found;
-    diagnostics.extend(found.iter().map(|conflict| conflict.diagnostic.clone()));
+    let shown = found.found.iter();
+    diagnostics.extend(shown.map(|conflict| conflict.diagnostic.clone()));
     diagnostics.sort_by_cached_key(|d| {
         let included = grammar.files.iter().position(|file| *file == d.file);
         (included.unwrap_or(usize::MAX), d.span.start)
     });
     if as_json {
-        let conflicts: Vec<_> = found
-            .iter()
-            .map(|conflict| {
-                Ok(json!({
-                    "first": conflict.first, "second": conflict.second,
-                    "message": conflict.diagnostic.to_string(), "graph": smallest(conflict)?,
-                }))
-            })
-            .collect::<Result<_, Failure>>()?;
-        print_json(&json!({
-            "diagnostics": diagnostics_json(&diagnostics), "conflicts": conflicts,
-            "conflicts_left": left,
-        }))?;
+        let mut object = conflicts_json(&found)?;
+        put_diagnostics(&mut object, &diagnostics);
+        print_json(&object)?;
     }
-    if conflicts && left > 0 {
-        tell(&format!(
-            "note: of {left} pairs of rules it was not found out whether one can disable the other: \
-             there was too much to try\n"
-        ));
+    if conflicts && found.left > 0 {
+        tell_undecided(&found);
     }
     if broken {
         return Err(Failure::Input(Defects { diagnostics }.into()));

@@ -16,13 +16,15 @@ pub(super) fn load(file: &Path, instance: &str, as_json: bool) -> Result<Answer,
     diagnostics.extend(grammar.check_schema(snapshot.schema()));
     if grammar::has_errors(&diagnostics) {
         if as_json {
-            let rows = super::diagnostics_json(&diagnostics);
-            print_json(&json!({ "loaded": false, "diagnostics": rows }))?;
+            let mut object = json!({ "loaded": false });
+            super::put_diagnostics(&mut object, &diagnostics);
+            print_json(&object)?;
         }
         return Err(Failure::Input(Defects { diagnostics }.into()));
     }
     diagnostics.retain(|diagnostic| diagnostic.severity() == Severity::Warning);
-    let rows = super::diagnostics_json(&diagnostics);
+    let mut object = json!({ "loaded": true });
+    super::put_diagnostics(&mut object, &diagnostics);
     warn(diagnostics);
     let transaction = grammar.publish(&snapshot).map_err(Failure::internal)?;
     let commit = match session.commit(&transaction, snapshot.time()) {
@@ -33,9 +35,9 @@ pub(super) fn load(file: &Path, instance: &str, as_json: bool) -> Result<Answer,
     };
     let rules = grammar.rules.len();
     if as_json {
-        print_json(&json!({
-            "loaded": true, "version": commit.version.0, "rules": rules, "diagnostics": rows,
-        }))?;
+        object["version"] = json!(commit.version.0);
+        object["rules"] = json!(rules);
+        print_json(&object)?;
     } else {
         print(&format!(
             "{rules} rules hold from version {}\n",

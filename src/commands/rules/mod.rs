@@ -144,7 +144,24 @@ fn load(file: &Path, rule: Option<&str>) -> Result<Grammar, Failure> {
     Ok(grammar)
 }
 
-fn diagnostics_json(diagnostics: &[Diagnostic]) -> Vec<Json> {
+/// So many findings are listed for machines, and so many characters of each.
+const DIAGNOSTICS_LIMIT: usize = 2_000;
+const MESSAGE_LIMIT: usize = 2_000;
+
+/// The beginning of a message: it can quote a pattern of any length.
+fn clipped(message: &str) -> String {
+    match message.char_indices().nth(MESSAGE_LIMIT) {
+        Some((end, _)) => format!(
+            "{} ... and {} more bytes",
+            &message[..end],
+            message.len() - end
+        ),
+        None => message.to_owned(),
+    }
+}
+
+/// Puts findings into an answer for machines: `diagnostics`, and in `diagnostics_left` how many more there are.
+fn put_diagnostics(object: &mut Json, diagnostics: &[Diagnostic]) {
     let row = |diagnostic: &Diagnostic| {
         let (line, column) = diagnostic.line_and_column();
         let message = match diagnostic.problem.help() {
@@ -153,10 +170,12 @@ fn diagnostics_json(diagnostics: &[Diagnostic]) -> Vec<Json> {
         };
         json!({
             "severity": diagnostic.severity().to_string(), "file": diagnostic.file.name(),
-            "line": line, "column": column, "message": message,
+            "line": line, "column": column, "message": clipped(&message),
         })
     };
-    diagnostics.iter().map(row).collect()
+    let rows = diagnostics.iter().take(DIAGNOSTICS_LIMIT).map(row);
+    object["diagnostics"] = rows.collect();
+    object["diagnostics_left"] = json!(diagnostics.len().saturating_sub(DIAGNOSTICS_LIMIT));
 }
 
 /// Says what is suspicious or wrong without ending the verb.
@@ -240,11 +259,10 @@ fn list(file: &Path, as_json: bool) -> Result<Answer, Failure> {
         let mut types: Vec<&str> = types.map(|name| &**name).collect();
         let mut seen = BTreeSet::new();
         types.retain(|name| seen.insert(*name));
-        print_json(&json!({
-            "types": types,
-            "rules": rules.chain(combos).collect::<Vec<_>>(),
-            "diagnostics": diagnostics_json(&diagnostics),
-        }))?;
+        let rules: Vec<Json> = rules.chain(combos).collect();
+        let mut object = json!({ "types": types, "rules": rules });
+        put_diagnostics(&mut object, &diagnostics);
+        print_json(&object)?;
         return Ok(Answer::Yes);
     }
     let mut text = String::new();

@@ -2,6 +2,7 @@
 //!
 //! Guarantee: a rule that touches nothing of what another looks at cannot disable it.
 
+use super::overlay::Shared;
 use crate::analysis::kinds::{Kind, Kinds};
 use crate::{AttributePath, Condition, Effect, Expression, Name, PatternNode, Rule};
 use std::collections::{BTreeMap, BTreeSet};
@@ -22,6 +23,8 @@ enum How {
 struct End {
     kind: Kind,
     how: How,
+    /// Its place among the nodes of the match, if it is one of them.
+    place: usize,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -37,6 +40,7 @@ enum Thing<'g> {
 }
 
 /// What a rule changes, and what it looks at.
+#[derive(Default)]
 pub(super) struct Touched<'g> {
     changes: Vec<Thing<'g>>,
     looks: Vec<Thing<'g>>,
@@ -56,15 +60,13 @@ impl<'g> Touched<'g> {
     pub(super) fn of(kinds: &Kinds<'g>, rule: &'g Rule) -> Self {
         let mut reader = Reader {
             kinds,
-            touched: Touched {
-                changes: Vec::new(),
-                looks: Vec::new(),
-                depth: 0,
-            },
+            touched: Touched::default(),
         };
         let mut scope = Scope::new();
-        for node in rule.bound_nodes() {
+        for (place, node) in rule.bound_nodes().enumerate() {
             if let Some(end) = reader.declare(&mut scope, node, How::Bound) {
+                let end = End { place, ..end };
+                scope.insert(&node.variable, end);
                 reader.touched.looks.push(Thing::Node(end, None));
                 let after = rule.right.node(&node.variable);
                 let becomes = after.and_then(|after| kinds.find(&after.type_name));
@@ -102,15 +104,25 @@ impl<'g> Touched<'g> {
         reader.touched
     }
 
-    /// What [`Self::may_disable`] costs.
+    /// What [`Self::needs`] costs.
     pub(super) fn checks(&self, other: &Self) -> u64 {
         (self.changes.len() * other.looks.len()) as u64
     }
 
-    /// Whether anything that is changed here is of a kind that the other looks at.
-    pub(super) fn may_disable(&self, kinds: &Kinds<'g>, other: &Self) -> bool {
-        let mut changes = self.changes.iter();
-        changes.any(|change| other.looks.iter().any(|look| touches(kinds, change, look)))
+    /// Of these sets of nodes one must be shared for a change here to be of what the other looks at; none where
+    /// nothing that is changed here is of a kind that it looks at.
+    pub(super) fn needs(&self, kinds: &Kinds<'g>, other: &Self) -> BTreeSet<Vec<Shared>> {
+        let looks = || other.looks.iter();
+        let pairs = self
+            .changes
+            .iter()
+            .flat_map(|one| looks().map(move |two| (one, two)));
+        let touching = pairs.filter(|(change, look)| touches(kinds, change, look));
+        let needs: BTreeSet<Vec<Shared>> = touching.map(|(a, b)| shared(a, b)).collect();
+        if needs.contains(&Vec::new()) {
+            return BTreeSet::from([Vec::new()]);
+        }
+        needs
     }
 
     /// Under which words [`Index`] finds who looks at what is changed here.
@@ -122,7 +134,8 @@ impl<'g> Touched<'g> {
 impl<'g> Reader<'_, 'g> {
     fn declare(&self, scope: &mut Scope<'g>, node: &'g PatternNode, how: How) -> Option<End> {
         let kind = self.kinds.find(&node.type_name)?;
-        let end = End { kind, how };
+        let place = 0;
+        let end = End { kind, how, place };
         scope.insert(&node.variable, end);
         Some(end)
     }
@@ -232,8 +245,8 @@ impl<'g> Reader<'_, 'g> {
                     type_name,
                 } => {
                     if let Some(kind) = self.kinds.find(type_name) {
-                        let how = How::Made;
-                        scope.insert(variable, End { kind, how });
+                        let (how, place) = (How::Made, 0);
+                        scope.insert(variable, End { kind, how, place });
                         self.touched.changes.push(Thing::New(kind));
                     }
                 }
@@ -325,6 +338,22 @@ fn touches(kinds: &Kinds, change: &Thing, look: &Thing) -> bool {
         }
         _ => false,
     }
+}
+
+/// Which nodes of the matches must be the same for a change to be of what is looked at. A node that a quantifier
+/// goes over can be any.
+fn shared(change: &Thing, look: &Thing) -> Vec<Shared> {
+    let ends: Vec<(End, End)> = match (change, look) {
+        (Thing::Link(ends, ..), Thing::Link(others, ..)) => {
+            ends.iter().copied().zip(others.iter().copied()).collect()
+        }
+        (Thing::Value(_, Ok(node)), Thing::Value(_, Ok(other)))
+        | (Thing::Node(node, _), Thing::Node(other, _)) => vec![(*node, *other)],
+        _ => Vec::new(),
+    };
+    let bound = |end: &End| end.how == How::Bound;
+    let both = ends.iter().filter(|(one, two)| bound(one) && bound(two));
+    both.map(|(one, two)| (two.place, one.place)).collect()
 }
 
 /// Which rules look at something under a word.
