@@ -138,6 +138,14 @@ pub enum Problem {
         /// What was probably meant.
         suggestion: Option<String>,
     },
+    /// A type that none of the files that could be read declares; one that is missing may.
+    #[error("no type `{name}` in the files that could be read: one that is missing may declare it")]
+    TypeNotRead {
+        /// As written.
+        name: String,
+        /// What was probably meant.
+        suggestion: Option<String>,
+    },
     /// A type that others inherit from, that is not declared itself and looks like one that is.
     #[error("type `{name}` is not declared, and taken as one that inherits from nothing")]
     UndeclaredParent {
@@ -146,10 +154,10 @@ pub enum Problem {
         /// What was probably meant.
         suggestion: String,
     },
-    /// A rule, combo step or alias that is not there.
+    /// A rule, combo step, alias or effect that is not there.
     #[error("no {what} `{name}`")]
     UnknownName {
-        /// Kind of thing: rule, alias.
+        /// Kind of thing: rule, alias, effect.
         what: &'static str,
         /// As written.
         name: String,
@@ -291,6 +299,7 @@ impl Problem {
     pub fn severity(&self) -> Severity {
         match self {
             Self::Incompatible { .. }
+            | Self::TypeNotRead { .. }
             | Self::UndeclaredParent { .. }
             | Self::NotUnfolded { .. }
             | Self::NeverMatches { .. }
@@ -308,6 +317,7 @@ impl Problem {
             Self::Expected { suggestion, .. }
             | Self::UnknownVariable { suggestion, .. }
             | Self::UnknownType { suggestion, .. }
+            | Self::TypeNotRead { suggestion, .. }
             | Self::NotInSchema { suggestion, .. }
             | Self::UnknownName { suggestion, .. } => suggestion
                 .as_ref()

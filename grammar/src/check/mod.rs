@@ -12,17 +12,19 @@ use crate::parser::{Action, Broken, Finding};
 use crate::{Goal, Grammar, Name, Pattern, PatternNode, Problem, Rule, Types};
 use dsr::suggest;
 use scope::Scope;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Checks the rules and combos against each other and the types.
 ///
 /// `broken` are rules that are there but have errors in them already: what could be read of them
-/// is checked, too. If files are `missing`, names may be declared there and are not complained of.
+/// is checked, too. If files are `missing`, names may be declared there: of types that is said,
+/// each once, and others are not complained of.
 pub(crate) fn check_grammar(grammar: &Grammar, broken: &[Broken], missing: bool) -> Vec<Finding> {
     let mut check = Check {
         types: &grammar.types,
         missing,
         rules: rule_names(grammar, broken),
+        not_read: BTreeSet::new(),
         findings: Vec::new(),
     };
     check.type_declarations();
@@ -64,6 +66,7 @@ pub(crate) fn check_goal(goal: &Goal, types: &Types, lost: &[Name]) -> Vec<Findi
         types,
         missing: false,
         rules: Vec::new(),
+        not_read: BTreeSet::new(),
         findings: Vec::new(),
     };
     check.pattern(&goal.pattern, &[], "left", "in this goal");
@@ -81,6 +84,8 @@ struct Check<'a> {
     missing: bool,
     /// Of all rules and combos, broken ones included.
     rules: Vec<Name>,
+    /// Types that were told to be in no file that could be read, each once.
+    not_read: BTreeSet<Name>,
     findings: Vec<Finding>,
 }
 
@@ -153,18 +158,27 @@ impl Check<'_> {
     }
 
     fn type_name(&mut self, name: &Name) {
-        if self.types.is_empty() || self.missing || self.types.contains(name) {
+        if self.types.is_empty() || self.types.contains(name) {
+            return;
+        }
+        if self.missing && !self.not_read.insert(name.clone()) {
             return;
         }
         let known = self.types.names().chain(self.types.undeclared());
         let suggestion = suggest(name, known.map(Name::as_str));
-        self.report(
-            name,
-            Problem::UnknownType {
-                name: name.to_string(),
+        let text = name.to_string();
+        let problem = if self.missing {
+            Problem::TypeNotRead {
+                name: text,
                 suggestion,
-            },
-        );
+            }
+        } else {
+            Problem::UnknownType {
+                name: text,
+                suggestion,
+            }
+        };
+        self.report(name, problem);
     }
 
     fn distinct_rules(&mut self) {

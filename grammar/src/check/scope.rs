@@ -3,7 +3,8 @@
 //! Guarantee: every name in a condition, effect or expression was looked up in its scope.
 
 use super::Check;
-use crate::{AttributePath, Condition, Effect, Expression, Name, PatternNode, Rule};
+use crate::{AttributePath, Condition, Effect, Expression, Name, PatternNode, Problem, Rule};
+use dsr::suggest;
 
 /// The variables that may be used at a place.
 pub(super) struct Scope {
@@ -136,6 +137,7 @@ impl Check<'_> {
         let outer = after.bound.len();
         for effect in effects {
             match effect {
+                Effect::Link { label, from, to } if self.is_misspelt(label, [from, to], after) => {}
                 Effect::Link { from, to, .. } | Effect::Unlink { from, to, .. } => {
                     self.variable(from, after);
                     self.variable(to, after);
@@ -185,6 +187,24 @@ impl Check<'_> {
             }
         }
         after.bound.truncate(outer);
+    }
+
+    /// Reports a link between what are no nodes, where its label looks like an effect that takes a variable and a type.
+    fn is_misspelt(&mut self, label: &Name, ends: [&Name; 2], scope: &Scope) -> bool {
+        let suggestion = suggest(label, ["create", "retype"]);
+        let misspelt = suggestion.is_some() && !ends.iter().all(|end| scope.contains(end));
+        if misspelt {
+            let name = label.to_string();
+            self.report(
+                label,
+                Problem::UnknownName {
+                    what: "effect",
+                    name,
+                    suggestion,
+                },
+            );
+        }
+        misspelt
     }
 
     fn path(&mut self, path: &AttributePath, scope: &Scope) {

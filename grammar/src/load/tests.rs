@@ -317,6 +317,92 @@ fn included_files_are_read_once_and_missing_ones_are_told() {
 }
 
 #[test]
+fn types_that_no_file_that_could_be_read_declares_are_told_once_each() {
+    let (_, diagnostics) = load_grammar(
+        "name=main\n===\ntypes\n{\n(thing)\n(room cup : thing)\n}\n===\ninclude(gone.aggl)\n\
+         a : active(1) { { x:rom y:cup z:sofa } => { x:rom y:cup z:sofa } }\n",
+        "main.aggl",
+        &mut |_, _| Err("no such file".to_owned()),
+    );
+    expect![[r#"
+        main.aggl:9:9: error: cannot read the included file `gone.aggl`: no such file
+        main.aggl:10:21: warning: no type `rom` in the files that could be read: one that is missing may declare it (did you mean `room`?)
+        main.aggl:10:33: warning: no type `sofa` in the files that could be read: one that is missing may declare it"#]].assert_eq(&Defects { diagnostics }.to_string());
+}
+
+#[test]
+fn misspelt_keywords_are_told_wherever_they_stand() {
+    let written = [
+        ("dormnat r : active(1) { A => A }", "dormant"),
+        ("r : actve(1) { A => A }", "active"),
+        ("r : pasive(1) { A => A }", "passive"),
+        ("r : active(1) succes(0.5) { A => A }", "success"),
+        ("r : active(1) activate(r) { A => A }", "activates"),
+        ("r : active(1) costs(2) { A => A }", "cost"),
+        ("r : active(1) durtion(2) { A => A }", "duration"),
+        ("r : active(1) agnet(nav) { A => A }", "agent"),
+        ("r : active(1) { A => A paramters { p:t } }", "parameters"),
+        (
+            "r : active(1) { A => A precondtion { (l a b) } }",
+            "precondition",
+        ),
+        ("r : active(1) { A => A efect { (l a b) } }", "effect"),
+        (
+            "r : active(1) { A => A precondition { (nto (l a b)) } }",
+            "not",
+        ),
+        (
+            "r : active(1) { A => A precondition { (adn (l a b) (l b a)) } }",
+            "and",
+        ),
+        (
+            "r : active(1) { A => A precondition { (exsts q:t (l a q)) } }",
+            "exists",
+        ),
+        (
+            "r : active(1) { A => A precondition { (foral q:t (l a q)) } }",
+            "forall",
+        ),
+        (
+            "r : active(1) { A => A precondition { (whne (l a b) (l b a)) } }",
+            "when",
+        ),
+        (
+            "r : active(1) { A => A effect { (assing a.n 3) } }",
+            "assign",
+        ),
+        (
+            "r : active(1) { A => A effect { (asign a.n (+ a.n 1)) } }",
+            "assign",
+        ),
+        (
+            "r : active(1) { A => A effect { (foral q:t (l a q)) } }",
+            "forall",
+        ),
+        (
+            "r : active(1) { A => A effect { (whne (l a b) (l b a)) } }",
+            "when",
+        ),
+        ("r : active(1) { A => A effect { (delte a) } }", "delete"),
+        ("r : active(1) { A => A effect { (creat c t) } }", "create"),
+        ("r : active(1) { A => A effect { (retpye a u) } }", "retype"),
+    ];
+    for (rule, keyword) in written {
+        let rule = rule.replace('A', "{ a:t b:t }");
+        let (_, diagnostics) = parse_grammar(&format!("name=x\n===\n{rule}\n"), "f.aggl");
+        let told: Vec<String> = diagnostics
+            .iter()
+            .filter_map(|d| d.problem.help())
+            .collect();
+        assert_eq!(told, [format!("did you mean `{keyword}`?")], "{rule}");
+    }
+    // A label may look like one, if it joins nodes.
+    read(
+        "name=x\n===\nr : active(1) { { a:t b:t } => { a:t b:t } effect { (creates a b) (assigns a b) } }\n",
+    );
+}
+
+#[test]
 fn a_diagnostic_underlines_its_place() {
     let (_, diagnostics) = parse_grammar(
         "name=x\n===\nr : active(1)\n{\n\t{ robot:robot room:room\n\t  robto->room(in) }\n\t=>\n\t{ }\n}\n",

@@ -384,32 +384,41 @@ impl Parser<'_> {
             self.wanted(label.span(), "a label or an operator", None);
             return None;
         }
+        let keyword = suggest(&label, keywords.iter().copied());
         if let [from, to] = items
             && !matches!(from, Form::List(..) | Form::Typed(_))
             && !matches!(to, Form::List(..) | Form::Typed(_))
+            // What looks like a keyword and does not join two nodes was meant as one.
+            && (keyword.is_none() || items.iter().all(|item| self.is_node_form(item)))
         {
             let from = self.node_form(from);
             return Some((label, from?, self.node_form(to)?));
         }
-        if let Some(keyword) = suggest(&label, keywords.iter().copied()) {
-            self.wanted(
-                label.span(),
-                "a link `(label a b)` or an operator",
-                Some(keyword),
-            );
+        if keyword.is_some() {
+            let expected = "a link `(label a b)` or an operator";
+            self.wanted(label.span(), expected, keyword);
         } else {
             self.wanted(span, "a link `(label a b)`", None);
         }
         None
     }
 
+    fn is_node_form(&self, form: &Form) -> bool {
+        match form {
+            Form::Word(name) => name.chars().all(|c| c.is_alphanumeric() || c == '_'),
+            Form::Number(_, name) => name.chars().all(char::is_alphanumeric),
+            Form::Text(_) => self.names == NodeNames::Goal,
+            _ => false,
+        }
+    }
+
     fn node_form(&mut self, form: &Form) -> Option<Name> {
         match form {
-            Form::Word(name) if name.chars().all(|c| c.is_alphanumeric() || c == '_') => {
+            Form::Word(name) | Form::Number(_, name) | Form::Text(name)
+                if self.is_node_form(form) =>
+            {
                 Some(name.clone())
             }
-            Form::Number(_, name) if name.chars().all(char::is_alphanumeric) => Some(name.clone()),
-            Form::Text(name) if self.names == NodeNames::Goal => Some(name.clone()),
             _ => {
                 self.wanted(form.span(), "a variable", None);
                 None
