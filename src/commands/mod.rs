@@ -8,7 +8,7 @@ pub(crate) mod graph;
 mod inspect;
 pub(crate) mod mission;
 mod new;
-mod output;
+pub(crate) mod output;
 mod path;
 mod plan;
 pub(crate) mod record;

@@ -98,3 +98,28 @@ fn a_thousand_people_are_tracked_beside_the_time_of_a_frame() {
     assert_eq!(names, ["track_1000", "track_1000_p99"]);
     assert!(rows.iter().all(|row| row["value"].as_f64().unwrap() > 0.0));
 }
+
+#[test]
+fn rules_are_not_measured_without_their_peers() {
+    let program = std::path::Path::new(env!("CARGO_BIN_EXE_cortex-under-test"));
+    // Beside it nothing is, and there is no cargo to build it with.
+    let folder = TempDir::new_in(program.parent().unwrap()).unwrap();
+    let alone = folder.path().join("cortex");
+    fs::hard_link(program, &alone).unwrap();
+    let output = std::process::Command::new(&alone)
+        .args(["bench", "rules", "--json"])
+        .env("PATH", folder.path())
+        .output()
+        .unwrap();
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{told}");
+    assert!(output.stdout.is_empty());
+    for words in [
+        "cortex-peers",
+        "cargo cannot be started",
+        "cargo install --path peers",
+    ] {
+        let told = told.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(told.contains(words), "{words}: {told}");
+    }
+}

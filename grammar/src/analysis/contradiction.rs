@@ -208,7 +208,7 @@ impl<'r> Search<'r> {
                     Some(Compared {
                         expression,
                         key: key(expression, &scope)?,
-                        side: side(expression, &scope)?,
+                        side: side(expression, &scope),
                     })
                 };
                 let sides = [compared(left)?, compared(right)?];
@@ -292,49 +292,44 @@ fn key(expression: &Expression, scope: &Scope) -> Option<String> {
 }
 
 /// What an expression adds to what.
-fn side(expression: &Expression, scope: &Scope) -> Option<Side> {
+fn side(expression: &Expression, scope: &Scope) -> Side {
     if let Some(constant) = constant(expression) {
-        return Some(Side::Constant(constant));
+        return Side::Constant(constant);
     }
-    Some(match expression {
-        Expression::Literal(_) => Side::Other,
-        Expression::Attribute(_) => Side::Sum {
-            base: key(expression, scope)?,
+    let sum = match expression {
+        Expression::Literal(_) => None,
+        Expression::Attribute(_) => key(expression, scope).map(|base| Side::Sum {
+            base,
             added: Vec::new(),
-        },
-        Expression::Arithmetic { operator, operands } => {
-            sum(*operator, operands, scope)?.unwrap_or(Side::Other)
-        }
-    })
+        }),
+        Expression::Arithmetic { operator, operands } => sum(*operator, operands, scope),
+    };
+    sum.unwrap_or(Side::Other)
 }
 
 /// The same for arithmetic, if it is a sum of one attribute and constants.
-fn sum(operator: Arithmetic, operands: &[Expression], scope: &Scope) -> Option<Option<Side>> {
+fn sum(operator: Arithmetic, operands: &[Expression], scope: &Scope) -> Option<Side> {
     let number = |value: &Expression| constant(value).as_ref().and_then(Number::of);
-    let Some(place) = operands.iter().position(|one| constant(one).is_none()) else {
-        return Some(None);
+    let place = operands.iter().position(|one| constant(one).is_none())?;
+    let Side::Sum { base, mut added } = side(&operands[place], scope) else {
+        return None;
     };
-    let Side::Sum { base, mut added } = side(&operands[place], scope)? else {
-        return Some(None);
-    };
-    let mut more: Vec<Option<Number>> = Vec::new();
     match operator {
         Arithmetic::Add => {
             if place > 0 {
                 let first: Option<Vec<Number>> = operands[..place].iter().map(number).collect();
-                more.push(first.and_then(|first| operator.compute(&first)));
+                added.push(operator.compute(&first?)?);
             }
-            more.extend(operands[place + 1..].iter().map(number));
+            for one in &operands[place + 1..] {
+                added.push(number(one)?);
+            }
         }
         Arithmetic::Subtract if place == 0 && operands.len() > 1 => {
-            let negative = |one| Arithmetic::Subtract.compute(&[number(one)?]);
-            more.extend(operands[1..].iter().map(negative));
+            for one in &operands[1..] {
+                added.push(Arithmetic::Subtract.compute(&[number(one)?])?);
+            }
         }
-        _ => return Some(None),
+        _ => return None,
     }
-    let Some(more) = more.into_iter().collect::<Option<Vec<Number>>>() else {
-        return Some(None);
-    };
-    added.extend(more);
-    Some(Some(Side::Sum { base, added }))
+    Some(Side::Sum { base, added })
 }

@@ -234,13 +234,13 @@ impl<'r> Facts<'r> {
 
     /// Whether a value can be other than itself: one that is no number in a real, or in a list of reals.
     fn may_differ_from_itself(&self, expression: &Expression) -> bool {
+        use ValueKind::{Bool, F32, F64, I32, I64, String, U32, U64};
         let Expression::Attribute(path) = expression else {
             return false;
         };
         let Some(declared) = self.schema.and_then(|schema| declared(schema, path)) else {
             return true;
         };
-        use ValueKind::{Bool, F32, F64, I32, I64, String, U32, U64};
         match declared.kind {
             Some(Bool | String | I32 | U32 | I64 | U64) => false,
             Some(F32 | F64) => declared.min.is_none() && declared.max.is_none(),

@@ -95,6 +95,14 @@ fn exact(value: &Value) -> Option<f64> {
     value.as_f64().filter(|number| number.abs() < EXACT)
 }
 
+#[allow(
+    clippy::float_cmp,
+    reason = "constants are compared as they are written"
+)]
+fn is_same(one: f64, other: f64) -> bool {
+    one == other
+}
+
 /// What is added, where all of it is whole.
 fn whole_sum(added: &[Number]) -> Option<i128> {
     added.iter().try_fold(0_i128, |sum, number| match number {
@@ -137,7 +145,7 @@ impl<'f> Order<'f> {
             order.constants.extend(ends.filter(|end| end.abs() < EXACT));
         }
         order.constants.sort_by(f64::total_cmp);
-        order.constants.dedup_by(|a, b| *a == *b);
+        order.constants.dedup_by(|a, b| is_same(*a, *b));
         order
     }
 
@@ -207,13 +215,15 @@ impl<'f> Order<'f> {
         }
     }
 
+    fn constant(&self, number: f64) -> Option<Node> {
+        let mut known = self.constants.iter();
+        let place = known.position(|known| is_same(*known, number))?;
+        Some(self.sums.len() + place)
+    }
+
     fn node_of(&self, key: &str, side: &Side) -> Option<Node> {
         match side {
-            Side::Constant(value) => {
-                let number = exact(value)?;
-                let place = self.constants.iter().position(|known| *known == number)?;
-                Some(self.sums.len() + place)
-            }
+            Side::Constant(value) => self.constant(exact(value)?),
             Side::Sum { .. } => self.sums.iter().position(|sum| sum.key == key),
             Side::Other => None,
         }
@@ -310,12 +320,12 @@ impl<'f> Order<'f> {
                 }
             }
             if let (true, Some(declared)) = (sum.key == sum.base, self.declared(sum.base)) {
-                let place = |end: f64| {
-                    let place = self.constants.iter().position(|known| *known == end);
-                    place.map(|place| self.sums.len() + place)
-                };
                 let strict = Strict::No;
-                let (least, most) = (declared.min.and_then(place), declared.max.and_then(place));
+                let constant = |end| self.constant(end);
+                let (least, most) = (
+                    declared.min.and_then(constant),
+                    declared.max.and_then(constant),
+                );
                 edges.extend(least.map(|from| Edge {
                     from,
                     to: node,

@@ -48,7 +48,7 @@ pub(crate) fn rules() -> Result<Vec<Quantity>, Failure> {
         return Err(Failure::Internal(grammar::Defects { diagnostics }.into()));
     }
     let grammar = Arc::new(grammar);
-    let peers = Peers::find();
+    let peers = Peers::find()?;
     let folder = Folder::new()?;
     let mut quantities = Vec::new();
     for (size, name) in SIZES {
@@ -59,7 +59,7 @@ pub(crate) fn rules() -> Result<Vec<Quantity>, Failure> {
         matching(
             &grammar,
             &graph.snapshot(),
-            (name, &file, peers.as_ref()),
+            (name, &file, &peers),
             &mut quantities,
         )?;
         rewriting(&grammar, &mut graph, &world, name, &mut quantities)?;
@@ -90,7 +90,7 @@ impl Drop for Folder {
 fn matching(
     grammar: &Arc<Grammar>,
     snapshot: &Snapshot,
-    (size, file, peers): (&str, &PathBuf, Option<&Peers>),
+    (size, file, peers): (&str, &PathBuf, &Peers),
     quantities: &mut Vec<Quantity>,
 ) -> Result<(), Failure> {
     let mut matcher = Matcher::new(Arc::clone(grammar));
@@ -123,7 +123,6 @@ fn matching(
         quantities.push(Quantity::new(named("plan_and_all"), planned, "us"));
         quantities.push(Quantity::new(named("all"), whole, "us"));
         for engine in ["vf2", "sqlite", "sqlite_tuned"] {
-            let Some(peers) = peers else { continue };
             let found = peers.all(engine, file, &words(rule))?;
             if found.count.is_some_and(|found| found != count) {
                 let told = format!("{engine} finds {found:?} matches of {name}, not {count}");

@@ -2,8 +2,9 @@
 //! is no part of this one. A peer that takes too long is ended, and its time is a lower bound.
 
 use crate::Failure;
+use crate::commands::output::tell;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 /// What a peer found of one pattern.
@@ -21,24 +22,43 @@ const LIMIT: Duration = Duration::from_secs(20);
 /// The peers' program.
 pub(super) struct Peers(PathBuf);
 
+/// Builds the program into the folder of target files that `beside` lies in.
+fn build(beside: &Path) -> std::io::Result<ExitStatus> {
+    let folder = beside.parent();
+    let release = folder.and_then(Path::file_name) == Some("release".as_ref());
+    let mut cargo = Command::new("cargo");
+    cargo.args(["build", "--quiet", "--package", "peers"]);
+    if let Some(target) = folder.and_then(Path::parent) {
+        cargo.arg("--target-dir").arg(target);
+    }
+    cargo
+        .args(release.then_some("--release"))
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .stdin(Stdio::null())
+        .status()
+}
+
 impl Peers {
-    /// Finds the program beside this one, or builds it in the workspace that this one was built
-    /// from; `None` where neither is possible.
-    pub(super) fn find() -> Option<Self> {
-        let beside = std::env::current_exe().ok()?.with_file_name("cortex-peers");
-        if !beside.is_file() {
-            let workspace = Path::new(env!("CARGO_MANIFEST_DIR"));
-            let release = beside.parent()?.file_name()? == "release";
-            let built = Command::new("cargo")
-                .args(["build", "--quiet", "--package", "peers", "--target-dir"])
-                .arg(beside.parent()?.parent()?)
-                .args(release.then_some("--release"))
-                .current_dir(workspace)
-                .stdin(Stdio::null())
-                .status();
-            built.ok().filter(std::process::ExitStatus::success)?;
+    /// Finds the program beside this one, or builds it in the workspace that this one was built from.
+    pub(super) fn find() -> Result<Self, Failure> {
+        let this = std::env::current_exe().map_err(Failure::internal)?;
+        let beside = this.with_file_name("cortex-peers");
+        if beside.is_file() {
+            return Ok(Self(beside));
         }
-        beside.is_file().then_some(Self(beside))
+        tell("building cortex-peers, which rules are measured beside\n");
+        let why = match build(&beside) {
+            Ok(status) if status.success() && beside.is_file() => return Ok(Self(beside)),
+            Ok(status) => format!("cargo ended with {status}"),
+            Err(error) => format!("cargo cannot be started: {error}"),
+        };
+        let what = format!(
+            "the program that rules are measured beside, {}, is not there and could not be built: {why}",
+            beside.display()
+        );
+        let help = "`cargo build --release --workspace` where Cortex's sources are builds both, and `cargo install \
+                    --path peers` puts it beside an installed `cortex`";
+        Err(Failure::input_with_help(what, help))
     }
 
     /// All matches of `pattern` in the world of a file, by `engine`: `vf2`, `sqlite` or `sqlite_tuned`.

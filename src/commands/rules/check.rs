@@ -88,16 +88,14 @@ fn conflicts_json(conflicts: &Conflicts) -> Result<serde_json::Value, Failure> {
 fn tell_undecided(conflicts: &Conflicts) {
     let left = conflicts.left;
     let pairs = if left == 1 { "pair" } else { "pairs" };
-    let mut text = format!(
-        "note: of {left} {pairs} of rules it was not found out whether one can disable the other:\n"
-    );
-    for (first, second, why) in conflicts.undecided.iter().take(TOLD) {
-        text.push_str(&format!("  `{first}` and `{second}`: {why}\n"));
-    }
+    let words = "it was not found out whether one can disable the other";
+    let mut lines = vec![format!("note: of {left} {pairs} of rules {words}:")];
+    let named = conflicts.undecided.iter().take(TOLD);
+    lines.extend(named.map(|(first, second, why)| format!("  `{first}` and `{second}`: {why}")));
     if left > TOLD {
-        text.push_str(&format!("  and {} more\n", left - TOLD));
+        lines.push(format!("  and {} more", left - TOLD));
     }
-    tell(&text);
+    tell(&format!("{}\n", lines.join("\n")));
 }
 
 pub(super) fn check(
