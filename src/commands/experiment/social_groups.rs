@@ -270,7 +270,7 @@ fn spaces() -> Result<Vec<Row>, Failure> {
         let plain = entity.widths(&FourSided::HALL);
         let widths = mood().apply(plain, &values);
         let sides = widths.sides().map(|side| format!("{side:.2}"));
-        // iv = FV . IV, and sigma^2 falls with it.
+        // Of sigma^2 ahead, what the mood leaves.
         let share = (widths.front / plain.front).powi(2);
         rows.push(row(
             format!("15, {name}: widths f l b r"),
@@ -279,18 +279,19 @@ fn spaces() -> Result<Vec<Row>, Failure> {
             None,
         ));
         rows.push(row(
-            format!("15, {name}: 1 - iv ahead"),
-            format!("{value} of mood, influence {}", INFLUENCE.front),
-            Cell::numbers(share, 1.0 - INFLUENCE.front * value, 1e-9),
+            format!("15, {name}: left of sigma^2 ahead"),
+            format!("{share:.3}"),
+            Cell::nothing(),
             None,
         ));
         let heading: Vector2<f64> = people.iter().map(|pose| pose.rotation * Vector2::x()).sum();
         let faces = entity.world_from_group.rotation.angle();
         if heading.norm() > 0.1 * people.len() as f64 {
+            let mean = (faces - heading.y.atan2(heading.x)).abs() < 1e-9;
             rows.push(row(
                 format!("15, {name}: orientation"),
-                "mean of the members'".to_owned(),
-                Cell::numbers(faces, heading.y.atan2(heading.x), 1e-9),
+                format!("{faces:.2}"),
+                claim(mean, "mean of the members'"),
                 None,
             ));
         } else {

@@ -251,15 +251,16 @@ fn moods() -> Vec<Row> {
             )
         })
         .collect();
-    // The text has the zone grow and shrink ahead in proportion to the mood.
-    for pair in MOODS.windows(2) {
-        let [(from, low), (to, high)] = [pair[0], pair[1]];
-        let step = of(high).front.powi(2) - of(low).front.powi(2);
-        rows.push(summary(
-            &format!("14a sigma^2 ahead, {from} to {to}"),
-            Cell::numbers(step, -MOOD[0] * (high - low), 1e-9),
-        ));
-    }
+    let slopes = MOODS.windows(2).map(|pair| {
+        let [(_, low), (_, high)] = [pair[0], pair[1]];
+        (of(high).front.powi(2) - of(low).front.powi(2)) / (high - low)
+    });
+    let proportional = slopes.collect::<Vec<f64>>();
+    let even = proportional
+        .iter()
+        .all(|slope| *slope < 0.0 && same(*slope, proportional[0]));
+    let (ours, says) = claim(even, "ahead it grows and shrinks in proportion to the mood");
+    rows.push(summary("14a ahead", Cell::texts(ours, says)));
     let behind = MOODS.iter().all(|(_, value)| same(of(*value).rear, BASE));
     let (ours, says) = claim(behind, "behind, where the influence is 0, nothing changes");
     rows.push(summary("14a behind", Cell::texts(ours, says)));
@@ -287,17 +288,16 @@ fn needs() -> Vec<Row> {
     });
     let (ours, says) = claim(untouched, "food and drink act to the left and right alone");
     rows.push(summary("14b ahead and behind", Cell::texts(ours, says)));
-    // iv = FV . IV to each side: features add up, weighed by their influences.
-    for (label, values, _) in NEEDS {
-        let both = of(&values);
-        let sides = [both.left, both.right].map(|side| 1.0 - side * side);
-        for (side, (ours, value)) in ["left", "right"].iter().zip(sides.into_iter().zip(values)) {
-            rows.push(summary(
-                &format!("14b iv {side}, {label}"),
-                Cell::numbers(ours, 0.5 * value, 1e-9),
-            ));
-        }
-    }
+    let weighed = NEEDS.iter().all(|(_, values, _)| {
+        let both = of(values);
+        let [left, right] = [both.left, both.right].map(|side| 1.0 - side * side);
+        same(left, SERVICE[0][1] * values[0]) && same(right, SERVICE[1][3] * values[1])
+    });
+    let (ours, says) = claim(
+        weighed,
+        "features combine in a linear way, their influences being the weights",
+    );
+    rows.push(summary("14b both features", Cell::texts(ours, says)));
     rows
 }
 
@@ -319,6 +319,8 @@ pub(super) fn shapes() -> Result<Table, Failure> {
             "Widths ahead, left, behind, right in units of the width without features. The figures print no lengths: what \
              their text says is compared,\nof Fig. 13 under `printed`, of Fig. 14 under `positive_is_closer`; \
              `--pictures DIR` draws them as ours are.",
+            "14b: the text's rule is food from the left and drink from the right; which side is the nearer in each of its four \
+             cases follows from that.",
             "READING.md 4: `printed` multiplies variances by the influence, so a happier person's space grows \
              ahead, against the text; `positive_is_closer` shrinks it, as the text and Fig. 14a have it.\n\
              A width whose printed influence is 0 or less stays as it is.",
