@@ -8,6 +8,7 @@ use crate::messages::{
     VelocityCommand,
 };
 use crate::navigation::graph::{Messages, Navigation};
+use crate::navigation::map_age::MapState;
 use crate::object_recognition::ObjectRecognition;
 use crate::social_mapping::config::{ConfigError, SocialConfig};
 use crate::social_mapping::graph::{SocialMapping, StepError};
@@ -132,14 +133,32 @@ pub fn social_mapping(mut session: Session, begin: Begin) -> Result<(), ProcessE
                 writer = Some(GridWriter::open(&mut session, world.id())?);
             }
             if let Some(writer) = &mut writer {
-                writer.give_out(grid, &mut transaction)?;
+                writer.give_out(grid, tick.time, &mut transaction)?;
             }
+        } else if let Some(writer) = &mut writer {
+            writer.confirm(tick.time, &mut transaction);
         }
         if session.submit(&transaction, tick.time)?.is_some() {
             uncommitted = None;
+        } else if let Some(writer) = writer.as_mut().filter(|_| !transaction.is_empty()) {
+            writer.unsaid();
         }
     }
     Ok(())
+}
+
+/// Says in the log what the social grid is worth from now on.
+fn tell_map(now: Time, state: MapState, age: Option<f64>) {
+    let age = age.unwrap_or(f64::NAN);
+    match state {
+        MapState::Current => tracing::info!(time = %now, "the social grid is current again"),
+        MapState::Old { .. } => {
+            tracing::warn!(time = %now, "the social grid is {age:.1} s old: the robot goes slower");
+        }
+        MapState::Lost => {
+            tracing::warn!(time = %now, "the social grid is {age:.1} s old: the robot stands until there is a newer one");
+        }
+    }
 }
 
 /// Runs navigation until it shall end; the robot is told to stand at the end.
@@ -154,6 +173,7 @@ pub fn navigation(mut session: Session, begin: Begin) -> Result<(), ProcessError
     let mut core = Navigation::new(crate::navigation::navigator::Config::default());
     let (mut pose, mut scan) = (None, None);
     let mut grid: Option<SharedGrid> = None;
+    let mut map = MapState::default();
     let mut turns = begin()?;
     while let Some(tick) = turns.next(&mut session)? {
         pose = odometry.newest()?.or(pose);
@@ -172,6 +192,11 @@ pub fn navigation(mut session: Session, begin: Begin) -> Result<(), ProcessError
         let Some(effects) = current(core.step(tick.time, &messages, &snapshot))? else {
             continue;
         };
+        let (state, age) = effects.map;
+        if state.name() != map.name() {
+            tell_map(tick.time, state, age);
+            map = state;
+        }
         velocity.send(&effects.command)?;
         if let Some(words) = &effects.speech {
             speech.send(words)?;

@@ -9,6 +9,7 @@ use crate::metrics::mapped;
 use crate::scenario::Scenario;
 use crate::world::{Inputs as WorldInputs, Truth, World};
 use agents::navigation::control::Limits;
+use agents::navigation::map_age::MapState;
 use agents::navigation::navigator::{Config, Inputs, Navigator, Status};
 use agents::navigation::people::Person;
 use agents::navigation::target::{Company, Target, Task};
@@ -124,6 +125,7 @@ impl Trial<'_> {
                     odometry: odometry.as_ref(),
                     scan: scan.as_ref(),
                     grid: grid.as_deref(),
+                    map: MapState::Current,
                     walls: &scenario.walls,
                     people: &people,
                     task: Some(&task),

@@ -5,7 +5,7 @@
 use super::{CostGrid, GridError, Region};
 use dsr::{
     LargeAttribute, LargeError, LargeHandle, LargeReadError, Node, NodeId, Owner, ReadError,
-    Session, Snapshot, Transaction, Value,
+    Session, Snapshot, Time, Transaction, Value,
 };
 use nalgebra::Point2;
 use std::sync::Arc;
@@ -21,6 +21,13 @@ pub const SOCIAL_GRID_PLACE: &str = "social_grid_place";
 /// The attribute of the world that says where the social grid differs from the one given out before it: the
 /// first column and the one after the last, the first row and the one after the last.
 pub const SOCIAL_GRID_DIRTY: &str = "social_grid_dirty";
+
+/// The attribute of the world that says as of when the social grid is what its scene makes of it, seconds since 1970. It is
+/// written with each grid, and once a [`CONFIRMED`] while the grid stays as it is: a grid whose time stands still is one
+/// that nobody keeps.
+pub const SOCIAL_GRID_TIME: &str = "social_grid_time";
+/// How often a grid that stays as it is is said to hold, seconds.
+pub const CONFIRMED: f64 = 1.0;
 
 /// A grid to give out.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,6 +74,20 @@ pub fn world(snapshot: &Snapshot) -> Result<Option<Node<'_>>, ReadError> {
 pub struct GridWriter {
     world: NodeId,
     grids: LargeAttribute,
+    confirmed: Confirmed,
+}
+
+/// When it was last said that the grid holds.
+#[derive(Debug, Clone, Copy, Default)]
+struct Confirmed(Option<Time>);
+
+impl Confirmed {
+    /// Whether it is to be said again.
+    fn is_due(self, now: Time) -> bool {
+        // Also where the clock was set back.
+        self.0
+            .is_none_or(|last| !(0.0..CONFIRMED).contains(&now.since(last)))
+    }
 }
 
 impl GridWriter {
@@ -76,16 +97,40 @@ impl GridWriter {
     /// [`LargeError`].
     pub fn open(session: &mut Session, world: NodeId) -> Result<Self, LargeError> {
         let grids = session.large(Owner::Node(world.into()), SOCIAL_GRID)?;
-        Ok(Self { world, grids })
+        let confirmed = Confirmed::default();
+        Ok(Self {
+            world,
+            grids,
+            confirmed,
+        })
     }
 
-    /// Sends the grid, and says in the transaction which it is, where it lies and what changed.
+    /// Says in the transaction that the grid given out holds as of `now`, where that was not said for [`CONFIRMED`]. To be
+    /// asked in each turn that made a map.
+    pub fn confirm(&mut self, now: Time, transaction: &mut Transaction) {
+        if self.confirmed.is_due(now) {
+            self.tell(now, transaction);
+        }
+    }
+
+    fn tell(&mut self, now: Time, transaction: &mut Transaction) {
+        self.confirmed = Confirmed(Some(now));
+        transaction.set(self.world, SOCIAL_GRID_TIME, now.seconds());
+    }
+
+    /// What was said last came to nobody: it is to be said again.
+    pub fn unsaid(&mut self) {
+        self.confirmed = Confirmed::default();
+    }
+
+    /// Sends the grid, and says in the transaction which it is, where it lies, what changed and that it holds as of `now`.
     ///
     /// # Errors
     /// [`LargeError`].
     pub fn give_out(
         &mut self,
         update: &GridUpdate,
+        now: Time,
         transaction: &mut Transaction,
     ) -> Result<(), LargeError> {
         let grid = &update.grid;
@@ -99,6 +144,7 @@ impl GridWriter {
         let Region { columns, rows } = update.dirty;
         let dirty = [columns.0, columns.1, rows.0, rows.1].map(|count| count as f64);
         transaction.set(self.world, SOCIAL_GRID_DIRTY, dirty);
+        self.tell(now, transaction);
         Ok(())
     }
 }
@@ -281,6 +327,20 @@ mod tests {
                 prop_assert_eq!(&known, &whole);
             }
         }
+    }
+
+    #[test]
+    fn that_a_grid_holds_is_said_once_a_second() {
+        let mut confirmed = Confirmed::default();
+        let mut said = Vec::new();
+        for tick in [0, 3, 9, 10, 12, 21, 4, 5] {
+            let now = Time::from_seconds(1000.0 + 0.1 * f64::from(tick));
+            if confirmed.is_due(now) {
+                confirmed = Confirmed(Some(now));
+                said.push(tick);
+            }
+        }
+        assert_eq!(said, [0, 10, 21, 4]);
     }
 
     #[test]

@@ -5,10 +5,13 @@
 mod people;
 mod read;
 
-pub use self::read::{AGENT, StepError, TALKING_DISTANCE};
+pub use self::read::{
+    AGENT, MAP_HOLD_AFTER, MAP_SLOW_AFTER, MAP_STATE, StepError, TALKING_DISTANCE,
+};
 
 use self::read::{Step, Work, World};
 use super::control::wrapped;
+use super::map_age::MapState;
 use super::navigator::{Config, Inputs, Navigator, Output, Status};
 use super::target::{INSIDE, Region, Target, Task};
 use crate::grid::CostGrid;
@@ -55,6 +58,8 @@ pub struct Effects {
     pub transactions: Vec<Transaction>,
     /// How the navigation stands.
     pub status: Status,
+    /// What the social grid is worth, and how many seconds ago it held, where it says when.
+    pub map: (MapState, Option<f64>),
 }
 
 /// The navigation agent without its process.
@@ -124,6 +129,7 @@ impl Navigation {
                 speech: None,
                 transactions: Vec::new(),
                 status: Status::Idle,
+                map: (MapState::Current, None),
             });
         };
         let step = read::step(snapshot)?;
@@ -157,6 +163,7 @@ impl Navigation {
             speech,
             transactions,
             status: output.status,
+            map: (world.map, world.map_age),
         })
     }
 
@@ -288,6 +295,11 @@ impl Navigation {
                 transaction.set(robot.id, "velocity", Value::Vector(moving.to_vec()));
             }
         }
+        if robot.map_state.as_deref() != Some(world.map.name())
+            && snapshot.schema().find_attribute(MAP_STATE).is_some()
+        {
+            transaction.set(robot.id, MAP_STATE, world.map.name());
+        }
         let path: Vec<f64> = self
             .navigator
             .path()
@@ -352,14 +364,17 @@ impl Navigation {
 }
 
 fn inputs<'a>(messages: &Messages<'a>, world: &'a World, task: Option<&'a Task>) -> Inputs<'a> {
+    let mut limits = world.robot.limits;
+    limits.max_speed *= world.map.share();
     Inputs {
         odometry: messages.odometry,
         scan: messages.scan,
         grid: messages.grid,
+        map: world.map,
         walls: &world.walls,
         people: &world.people,
         task,
-        limits: world.robot.limits,
+        limits,
         social: world.social,
     }
 }

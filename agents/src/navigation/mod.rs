@@ -11,6 +11,7 @@ pub mod band;
 pub mod control;
 pub mod graph;
 pub mod ground;
+pub mod map_age;
 pub mod navigator;
 pub mod obstacles;
 pub mod path;

@@ -17,6 +17,7 @@ use super::anticipation::Anticipation;
 use super::band::{Band, Gains};
 use super::control::{Guard, Limits, Motion, Unicycle, turn_to, wrapped};
 use super::ground::Ground;
+use super::map_age::MapState;
 use super::obstacles::{Obstacles, Wall, world_hits};
 use super::path::PathError;
 use super::people::{Person, Presence};
@@ -77,6 +78,8 @@ pub struct Inputs<'a> {
     pub scan: Option<&'a LaserScan>,
     /// The latest cost grid, widened by the robot's radius (layer `inflation`).
     pub grid: Option<&'a CostGrid>,
+    /// What the grid is worth at its age.
+    pub map: MapState,
     /// The walls of the map.
     pub walls: &'a [Wall],
     /// The people known, where they are now.
@@ -113,6 +116,8 @@ pub enum Cause {
     NoScan,
     /// No grid yet.
     NoGrid,
+    /// The grid is too old to drive by.
+    OldGrid,
     /// The person it leads to is not in sight.
     NoPerson,
     /// No way there at present.
@@ -349,6 +354,11 @@ impl Navigator {
         let Some(grid) = view.inputs.grid else {
             return (STAND, Status::Waiting(Cause::NoGrid));
         };
+        if view.inputs.map == MapState::Lost {
+            // Nobody is to blame for the way but the map.
+            course.headway = view.now;
+            return (STAND, Status::Waiting(Cause::OldGrid));
+        }
         self.look_around(view);
         if let Some(until) = course.backing_until {
             if view.now < until {

@@ -1,7 +1,9 @@
 //! What the navigation reads from the graph: the map, the people, the robot's body, and the step it
 //! shall carry out. This file owns the names of the nodes and attributes that it goes by.
 
+use crate::grid::shared::SOCIAL_GRID_TIME;
 use crate::navigation::control::Limits;
+use crate::navigation::map_age::{MapPatience, MapState};
 use crate::navigation::obstacles::Wall;
 use crate::navigation::people::Person;
 use crate::navigation::target::{Company, End, Target};
@@ -12,6 +14,13 @@ use thiserror::Error;
 
 /// The agent's name in `step` nodes.
 pub const AGENT: &str = "navigation";
+/// The robot's attribute that says what the social grid is worth at its age: `current`, `old` or `lost`.
+pub const MAP_STATE: &str = "map_state";
+/// The robot's attributes that say from which age of the grid on it drives slower, and stands, seconds. They may be set
+/// while running; where they are absent, [`MapPatience`] has the usual figures.
+pub const MAP_SLOW_AFTER: &str = "map_slow_after";
+/// See [`MAP_SLOW_AFTER`].
+pub const MAP_HOLD_AFTER: &str = "map_hold_after";
 /// How far from a person the robot stops to talk, metres: outside personal space, which ends 1.18 m
 /// ahead of people, and well within `is_near` (2 m).
 pub const TALKING_DISTANCE: f64 = 1.3;
@@ -26,6 +35,10 @@ pub(super) struct World {
     pub(super) id: NodeId,
     pub(super) robot: Robot,
     pub(super) social: bool,
+    /// How many seconds ago the social grid held, where it says when.
+    pub(super) map_age: Option<f64>,
+    /// What it is worth. One that does not say when it held counts as current.
+    pub(super) map: MapState,
     pub(super) walls: Vec<Wall>,
     pub(super) people: Vec<Person>,
     pub(super) rooms: Vec<Room>,
@@ -40,6 +53,8 @@ pub(super) struct Robot {
     /// What `path` says now.
     pub(super) path: Vec<f64>,
     pub(super) room: Option<NodeId>,
+    /// What `map_state` says now.
+    pub(super) map_state: Option<String>,
 }
 
 /// A room's node.
@@ -161,9 +176,18 @@ pub(super) fn world(snapshot: &Snapshot, now: Time) -> Result<Option<World>, Rea
             polygon: corners.map(|&[x, y]| Point2::new(x, y)).collect(),
         });
     }
+    let held = number(&world, SOCIAL_GRID_TIME)?;
+    let map_age = held.map(|held| now.since(Time::from_seconds(held)));
+    let usual = MapPatience::default();
+    let patience = MapPatience {
+        slow_after: number(&robot, MAP_SLOW_AFTER)?.unwrap_or(usual.slow_after),
+        hold_after: number(&robot, MAP_HOLD_AFTER)?.unwrap_or(usual.hold_after),
+    };
     Ok(Some(World {
         id: world.id(),
         robot: self::robot(snapshot, &robot)?,
+        map_age,
+        map: map_age.map_or(MapState::Current, |age| patience.judge(age)),
         social: world
             .value("social")?
             .and_then(|value| value.as_bool())
@@ -198,6 +222,7 @@ fn robot(snapshot: &Snapshot, node: &Node) -> Result<Robot, ReadError> {
         velocity: vector(node, "velocity")?,
         path: numbers(node, "path")?,
         room,
+        map_state: text(node, MAP_STATE)?,
     })
 }
 

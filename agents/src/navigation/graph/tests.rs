@@ -1,5 +1,6 @@
 //! Navigation on the graph: steps are carried out, resumed and reported.
 
+mod map_age;
 mod people;
 
 use super::people::ASKING;
@@ -16,45 +17,7 @@ use std::sync::Arc;
 
 const TICK: f64 = 0.1;
 
-const SCHEMA: &str = r#"
-[types]
-thing = []
-world = ["thing"]
-room = ["thing"]
-person = ["thing"]
-robot = ["thing"]
-place = ["thing"]
-step = ["thing"]
-[labels]
-pose = { from = ["thing"], to = ["thing"] }
-in = { from = ["person", "robot"], to = ["room"] }
-connected = { from = ["room"], to = ["room"] }
-is_near = { from = ["robot"], to = ["person"] }
-front = { from = ["person"], to = ["robot"] }
-at = { from = ["robot"], to = ["place"] }
-allows = { from = ["person"], to = ["robot"] }
-passed = { from = ["person"], to = ["robot"] }
-followed = { from = ["robot"], to = ["person"] }
-[attributes]
-transform = { kind = "pose" }
-walls = { kind = "f64_list" }
-social = { kind = "bool" }
-polygon = { kind = "f64_list" }
-door = { kind = "vector" }
-distance = { kind = "f64" }
-radius = { kind = "f64" }
-max_speed = { kind = "f64" }
-max_turn = { kind = "f64" }
-velocity = { kind = "vector" }
-last_seen = { kind = "f64" }
-path = { kind = "f64_list" }
-rule = { kind = "string" }
-agent = { kind = "string" }
-status = { kind = "string" }
-index = { kind = "u64" }
-binding = { kind = "string" }
-reason = { kind = "string" }
-"#;
+const SCHEMA: &str = include_str!("tests/schema.toml");
 
 /// The rules, as far as their effects go.
 #[derive(Debug)]

@@ -153,6 +153,7 @@ fn cross(seed: u64, noise: f64, social: bool) -> Tally {
                 odometry: Some(&odometry),
                 scan: Some(&scan),
                 grid: Some(&grid),
+                map: MapState::Current,
                 walls: &walls,
                 people: &known,
                 task: Some(&task),

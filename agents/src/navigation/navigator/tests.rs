@@ -19,6 +19,7 @@ struct Hall {
     grid: CostGrid,
     people: Vec<Person>,
     social: bool,
+    map: MapState,
     navigator: Navigator,
     least_clearance: f64,
 }
@@ -63,6 +64,7 @@ impl Hall {
             grid: CostGrid::covering([0.0, 0.0, 8.0, 6.0], 0.1),
             people: Vec::new(),
             social: false,
+            map: MapState::Current,
             navigator: Navigator::default(),
             least_clearance: f64::INFINITY,
         };
@@ -92,6 +94,7 @@ impl Hall {
             odometry: Some(&odometry),
             scan: Some(&scan),
             grid: Some(&self.grid),
+            map: self.map,
             walls: &self.walls,
             people: &self.people,
             task,
@@ -169,6 +172,7 @@ fn without_fresh_readings_the_robot_stands() {
         odometry: Some(&odometry),
         scan: Some(&scan),
         grid: None,
+        map: MapState::Current,
         walls: &hall.walls,
         people: &[],
         task: Some(&task),
@@ -192,6 +196,26 @@ fn without_fresh_readings_the_robot_stands() {
         assert_eq!(output.status, Status::Waiting(cause));
         assert_eq!((output.command.linear, output.command.angular), (0.0, 0.0));
     }
+}
+
+#[test]
+fn by_a_lost_map_the_robot_stands_until_there_is_one_again() {
+    let mut hall = Hall::new();
+    let task = point(6.5, 3.0);
+    for _ in 0..30 {
+        hall.step(Some(&task));
+    }
+    hall.map = MapState::Lost;
+    let mut output = hall.step(Some(&task));
+    // Longer than it would look for a way out, or give up.
+    for _ in 0..(100.0 / STEP) as usize {
+        output = hall.step(Some(&task));
+    }
+    assert_eq!(output.status, Status::Waiting(Cause::OldGrid));
+    assert!(output.command.linear.abs() < 1e-9);
+    assert!(!hall.navigator.path().is_empty(), "its way is kept");
+    hall.map = MapState::Current;
+    assert_eq!(hall.run(&task, 30.0).0, Status::Arrived);
 }
 
 #[test]
