@@ -2,7 +2,7 @@
 //! R(t).
 
 use super::canvas::{FAINT, INK, View, heat, text_width};
-use super::label::{Labels, Look};
+use super::label::{Labels, Look, WALL};
 use crate::metrics::ObjectSpace;
 use crate::scenario::{Object, Scenario};
 use dsr::Time;
@@ -103,6 +103,9 @@ pub(super) fn label_all(
         colour: FAINT,
         bold: true,
     };
+    for [from, to] in &scenario.walls {
+        labels.shun_line(view.page(*from), view.page(*to), WALL);
+    }
     let (used, others): (Vec<_>, Vec<_>) = scenario
         .objects
         .iter()
@@ -111,10 +114,8 @@ pub(super) fn label_all(
         |object: &&Object| text_width(&object.name, plain.size) < 2.0 * view.px(object.size.max());
     for object in used.into_iter().chain(others.into_iter().filter(fits)) {
         let place = view.page(centre(object));
-        if !labels.centred(place, &object.name, plain) {
-            let reach = view.px(object.size.min() / 2.0);
-            labels.beside(place, reach, &object.name, plain);
-        }
+        let reach = view.px(object.size.min() / 2.0);
+        labels.on_or_beside(place, reach, &object.name, plain);
     }
     for object in &scenario.objects {
         let radius = view.px(object.size.min() / 2.0);

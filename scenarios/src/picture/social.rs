@@ -7,7 +7,7 @@ mod key;
 mod passing;
 
 use super::canvas::{self, INK, PEOPLE, View, heat, number, text};
-use super::label::{Labels, Look};
+use super::label::{Labels, Look, WALL};
 use super::legend;
 use crate::situation::Situation;
 use agents::social_mapping::object_space::Outline;
@@ -101,6 +101,9 @@ fn map(
     show: Show,
 ) -> Group {
     let mut labels = Labels::new(view);
+    for [from, to] in &situation.scene.walls {
+        labels.shun_line(view.page(*from), view.page(*to), WALL);
+    }
     let floor = if situation.rooms.is_empty() {
         "#ffffff"
     } else {
@@ -158,9 +161,7 @@ fn label_objects(
         };
         let words = format!("{} R = {:.2}", one.name, one.usage);
         let centre = view.page(one.world_from_object.translation.vector.into());
-        if !labels.centred(centre, &words, look) {
-            labels.beside(centre, view.px(0.5), &words, look);
-        }
+        labels.on_or_beside(centre, view.px(0.5), &words, look);
     }
 }
 

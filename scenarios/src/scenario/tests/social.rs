@@ -3,8 +3,10 @@
 
 use super::*;
 use agents::human_observer::Association;
+use agents::social_mapping::adaptation::WallAdaptation;
 use agents::social_mapping::groups::Method;
-use agents::social_mapping::{AsymmetricGaussian, SocialConfig};
+use agents::social_mapping::{AsymmetricGaussian, SocialConfig, UsageCurve};
+use std::collections::BTreeMap;
 
 /// The example of the book.
 fn example() -> &'static str {
@@ -82,5 +84,60 @@ fn the_human_observers_figures_are_read_and_unusable_ones_told() {
         let invalid = with(table).expect_err("a bad file");
         let told = invalid.problems[0].kind.to_string();
         assert!(told.contains(says), "{told}");
+    }
+}
+
+/// Each key of the configuration that the code has, with its default.
+fn keys(value: &serde_json::Value, path: &str, found: &mut BTreeMap<String, serde_json::Value>) {
+    /// What has names of its own, and what stands for these in the book.
+    const NAMED: [(&str, &str); 7] = [
+        ("spaces", "CLASS"),
+        ("usage_of", "OBJECT"),
+        ("activities", "NAME"),
+        ("activity_in", "ROOM"),
+        ("features.known", "NAME"),
+        ("features.known.NAME.levels", "LEVEL"),
+        ("cooperation", "TASK"),
+    ];
+    match value {
+        serde_json::Value::Object(fields) if path != "usage_of.OBJECT" => {
+            let named = NAMED.iter().find(|(owner, _)| *owner == path);
+            for (key, field) in fields {
+                let key = named.map_or(key.as_str(), |(_, name)| name);
+                let dot = if path.is_empty() { "" } else { "." };
+                keys(field, &format!("{path}{dot}{key}"), found);
+            }
+        }
+        serde_json::Value::Array(items) => items.iter().for_each(|one| keys(one, path, found)),
+        _ => drop(found.insert(path.to_owned(), value.clone())),
+    }
+}
+
+#[test]
+fn the_book_has_every_key_and_its_default() {
+    let config = SocialConfig {
+        walls: Some(WallAdaptation::default()),
+        usage: UsageCurve::stepped(),
+        usage_of: [("tv".to_owned(), UsageCurve::default())].into(),
+        activity_in: [("kitchen".to_owned(), "cooking".to_owned())].into(),
+        ..SocialConfig::default()
+    };
+    let mut expected = BTreeMap::new();
+    keys(&serde_json::to_value(&config).unwrap(), "", &mut expected);
+    let book = include_str!("../../../../docs/src/social-settings.md");
+    let mut told = BTreeMap::new();
+    for row in book.lines().filter(|line| line.starts_with("| `")) {
+        let cells: Vec<&str> = row
+            .split('|')
+            .map(|cell| cell.trim().trim_matches('`'))
+            .collect();
+        told.insert(cells[1], cells[2]);
+    }
+    let names: Vec<&str> = expected.keys().map(String::as_str).collect();
+    assert_eq!(told.keys().copied().collect::<Vec<_>>(), names);
+    for (key, default) in told.into_iter().filter(|(_, default)| !default.is_empty()) {
+        let default: serde_json::Value = serde_json::from_str(default).unwrap();
+        assert_eq!(default.as_f64(), expected[key].as_f64(), "{key}");
+        assert!(default.is_number() || default == expected[key], "{key}");
     }
 }
