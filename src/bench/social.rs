@@ -126,7 +126,13 @@ fn densities(quantities: &mut Vec<Quantity>) -> Result<(), Failure> {
     }
     let anew = seconds(RUNS, || (), |()| drop(black_box(field(black_box(&people)))));
     let rows = [
-        ("density_100_one_moved", update, "a new field", anew),
+        (
+            "density_100_one_moved",
+            update,
+            "drawing all anew into the same memory",
+            rebuild,
+        ),
+        ("density_100_one_moved_new", update, "a new field", anew),
         ("density_1000", draw(&many), "a frame of 30 Hz", FRAME),
     ];
     quantities.extend(rows.map(|(name, ours, beside, peer)| quantity(name, ours, beside, peer)));

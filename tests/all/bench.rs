@@ -71,6 +71,7 @@ fn the_figures_of_social_maps_are_all_there_each_beside_something() {
         [
             "density_100",
             "density_100_one_moved",
+            "density_100_one_moved_new",
             "density_1000",
             "contours_100",
             "map_100_one_moved",

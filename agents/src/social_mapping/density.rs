@@ -123,6 +123,10 @@ impl DensityField {
         Arch::new().dispatch(One(self, index, source));
     }
 
+    #[expect(
+        clippy::needless_bitwise_bool,
+        reason = "where the second is asked only after the first, that is a branch"
+    )]
     #[inline(always)]
     fn updated(&mut self, index: usize, source: &Source) {
         let new = Kernel::new(source, &self.frame);
@@ -130,10 +134,12 @@ impl DensityField {
             return;
         };
         let old = std::mem::replace(slot, new);
-        let Region { columns, rows } = old.tiles.joined(&new.tiles);
+        let reach = old.tiles.joined(&new.tiles);
+        let Region { columns, rows } = reach;
         let across = self.across();
-        // Tiles with cells that the person leaves to others, and how great no deviation there can be now.
-        let (mut open, mut around) = (Vec::new(), Region::default());
+        // What becomes of a tile is known only when it is looked at, and a processor that guesses loses more than it
+        // takes to write down all: so no step here branches on it.
+        let mut touched = Listed::new(reach.area());
         for row in rows.0..rows.1 {
             for first in (columns.0..columns.1).step_by(SIDE) {
                 let count = SIDE.min(columns.1 - first);
@@ -143,64 +149,58 @@ impl DensityField {
                     old.least_in_tiles(row, first),
                     new.least_in_tiles(row, first),
                 );
-                let leaves: [bool; SIDE] = std::array::from_fn(|i| was[i] < worst[i]);
-                let enters: [bool; SIDE] = std::array::from_fn(|i| is[i] < worst[i]);
-                let is = new.at_tiles(row, first);
-                for i in 0..count {
-                    let tile = first + i;
-                    let cells = &mut self.tiles[row * across + tile];
-                    if !(leaves[i] || enters[i]) {
-                        continue;
-                    }
-                    let changed = if leaves[i] {
-                        let given = old.give_way(&new, row, tile, cells);
-                        if given.open {
-                            let bound = new.most(is[i]).min(LIMIT.sqrt());
-                            open.push((row, tile, bound));
-                            around = around.joined(&one(row, tile));
-                            continue;
-                        }
-                        given.changed
-                    } else {
-                        let before = *cells;
-                        new.draw(row, tile, cells);
-                        differ(&before, cells)
-                    };
-                    if changed {
-                        self.finish(row, tile);
-                    }
+                let concerns: [bool; SIDE] =
+                    std::array::from_fn(|i| (was[i] < worst[i]) | (is[i] < worst[i]));
+                for (tile, concerns) in (first..columns.1).zip(concerns) {
+                    touched.push([row as u32, tile as u32], concerns);
                 }
             }
         }
-        self.fill(index, &open, &around);
-        for (row, tile, _) in open {
+        // Tiles with cells that the person leaves to others, and those that are as they shall be.
+        let mut open = Listed::new(touched.len);
+        let mut done = Listed::new(touched.len);
+        for [row, tile] in touched.all() {
+            let cells = &mut self.tiles[row * across + tile];
+            let given = old.give_way(&new, row, tile, cells);
+            let place = [row as u32, tile as u32];
+            open.push(place, given.open);
+            done.push(place, given.changed & !given.open);
+        }
+        self.fill(index, &new, &open);
+        for [row, tile] in done.all().chain(open.all()) {
             self.finish(row, tile);
         }
     }
 
-    /// Draws everybody but one in the open tiles, all of them `around`, as far as they may have less there than is known.
+    /// Draws everybody but one in the open tiles, as far as they may have less there than that one.
     #[inline(always)]
-    fn fill(&mut self, but: usize, open: &[(usize, usize, f32)], around: &Region) {
+    fn fill(&mut self, but: usize, own: &Kernel, open: &Listed) {
         let across = self.across();
-        let ((left, right), bottom) = (around.columns, around.rows.0);
-        let stride = right.saturating_sub(left).next_multiple_of(SIDE);
+        let around = open.around();
+        let ((left, right), (bottom, top)) = (around.columns, around.rows);
+        let stride = right.saturating_sub(left) + SIDE;
         // Nothing is less than what is no number: so are tiles that are not open.
-        let mut bounds = vec![f32::NAN; stride * around.rows.1.saturating_sub(bottom)];
-        for (row, tile, bound) in open {
-            bounds[(row - bottom) * stride + tile - left] = *bound;
+        let mut bounds = vec![f32::NAN; stride * top.saturating_sub(bottom)];
+        let mut spans = vec![(usize::MAX, 0); top.saturating_sub(bottom)];
+        for [row, tile] in open.all() {
+            bounds[(row - bottom) * stride + tile - left] = own.bound_in(row, tile);
+            let (first, last) = &mut spans[row - bottom];
+            (*first, *last) = ((*first).min(tile), (*last).max(tile + 1));
         }
         for (other, kernel) in self.people.iter().enumerate() {
-            let here = kernel.tiles.common(around);
+            let here = kernel.tiles.common(&around);
             if other == but || here.is_empty() {
                 continue;
             }
             for row in here.rows.0..here.rows.1 {
-                for first in (left..right).step_by(SIDE) {
+                let (first, last) = spans[row - bottom];
+                let (first, last) = (first.max(here.columns.0), last.min(here.columns.1));
+                for first in (first..last).step_by(SIDE) {
                     let least = kernel.least_in_tiles(row, first);
                     let bounds = &bounds[(row - bottom) * stride + first - left..][..SIDE];
                     let wins: [bool; SIDE] = std::array::from_fn(|i| least[i] < bounds[i]);
-                    for (tile, wins) in (first..).zip(wins) {
-                        if wins && (here.columns.0..here.columns.1).contains(&tile) {
+                    for (tile, wins) in (first..last).zip(wins) {
+                        if wins {
                             kernel.draw(row, tile, &mut self.tiles[row * across + tile]);
                         }
                     }
@@ -244,23 +244,43 @@ impl DensityField {
     }
 }
 
-/// Whether a cell of two tiles differs.
-#[inline(always)]
-fn differ(one: &Tile, other: &Tile) -> bool {
-    let mut bits = [0; SIDE];
-    for (one, other) in one.iter().zip(other) {
-        for i in 0..SIDE {
-            bits[i] |= one[i].to_bits() ^ other[i].to_bits();
-        }
-    }
-    bits.iter().any(|bits| *bits != 0)
+/// Rows and columns of tiles, written down without a branch.
+struct Listed {
+    places: Vec<[u32; 2]>,
+    len: usize,
 }
 
-/// A tile by itself.
-fn one(row: usize, tile: usize) -> Region {
-    Region {
-        columns: (tile, tile + 1),
-        rows: (row, row + 1),
+impl Listed {
+    /// None yet, and at most so many.
+    #[inline(always)]
+    fn new(most: usize) -> Self {
+        Self {
+            places: vec![[0; 2]; most + 1],
+            len: 0,
+        }
+    }
+
+    #[inline(always)]
+    fn push(&mut self, place: [u32; 2], really: bool) {
+        self.places[self.len] = place;
+        self.len += usize::from(really);
+    }
+
+    #[inline(always)]
+    fn all(&self) -> impl Iterator<Item = [usize; 2]> {
+        let places = self.places[..self.len].iter();
+        places.map(|place| place.map(|count| count as usize))
+    }
+
+    /// The region around all.
+    #[inline(always)]
+    fn around(&self) -> Region {
+        let tile = |[row, tile]: [usize; 2]| Region {
+            columns: (tile, tile + 1),
+            rows: (row, row + 1),
+        };
+        let all = self.all().map(tile);
+        all.fold(Region::default(), |all, one| all.joined(&one))
     }
 }
 

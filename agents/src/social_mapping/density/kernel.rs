@@ -265,6 +265,13 @@ impl Kernel {
         squared.sqrt() + self.margin
     }
 
+    /// The greatest deviation that it may have in a tile, and at most the limit.
+    #[inline(always)]
+    pub(super) fn bound_in(&self, row: usize, tile: usize) -> f32 {
+        let [x, y] = self.place_of_tile(row, tile);
+        less(self.most(self.squared(x, y)), LIMIT.sqrt())
+    }
+
     /// Whether in a tile of which the centre has this squared deviation a cell may have less than `worst`.
     #[inline(always)]
     pub(super) fn may_win(&self, squared: f32, worst: f32) -> bool {
