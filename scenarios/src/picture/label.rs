@@ -64,15 +64,16 @@ impl Labels {
         self.put_first(&starts, content, look)
     }
 
-    /// Writes `content` on a disc of `radius` around `centre` (px), or beside it.
-    pub(super) fn on_or_beside(
+    /// Writes `content` on a thing: a disc of `radius` around `centre` (px), or in the middle of its space, or beside it.
+    pub(super) fn on_thing(
         &mut self,
-        centre: Point2<f64>,
-        radius: f64,
+        (centre, radius): (Point2<f64>, f64),
+        middle: Point2<f64>,
         content: &str,
         look: Look,
     ) -> bool {
         let mut starts = on(centre, content, look);
+        starts.extend(on(middle, content, look));
         starts.extend(around(centre, radius, content, look));
         self.put_first(&starts, content, look)
     }
@@ -233,10 +234,14 @@ mod tests {
         };
         let wall = 200.0;
         labels.shun_line(Point2::new(wall, 0.0), Point2::new(wall, 400.0), 3.0);
+        let on = Point2::new(wall, 200.0);
         let on_wall = |area: &[f64; 4]| area[0] < wall && wall < area[2];
-        assert!(labels.on_or_beside(Point2::new(wall, 200.0), 8.0, "a television", look));
-        assert!(!on_wall(&labels.taken[0]));
-        assert!(labels.centred(Point2::new(wall, 200.0), "it", look));
+        assert!(labels.on_thing((on, 8.0), Point2::new(120.0, 200.0), "a television", look));
+        assert!(
+            !on_wall(&labels.taken[0]) && labels.taken[0][2] < wall,
+            "in its space"
+        );
+        assert!(labels.centred(on, "it", look));
         assert!(labels.taken.last().is_some_and(on_wall));
     }
 }

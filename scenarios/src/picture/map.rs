@@ -115,7 +115,7 @@ pub(super) fn label_all(
     for object in used.into_iter().chain(others.into_iter().filter(fits)) {
         let place = view.page(centre(object));
         let reach = view.px(object.size.min() / 2.0);
-        labels.on_or_beside(place, reach, &object.name, plain);
+        labels.on_thing((place, reach), place, &object.name, plain);
     }
     for object in &scenario.objects {
         let radius = view.px(object.size.min() / 2.0);

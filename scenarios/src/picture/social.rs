@@ -161,7 +161,10 @@ fn label_objects(
         };
         let words = format!("{} R = {:.2}", one.name, one.usage);
         let centre = view.page(one.world_from_object.translation.vector.into());
-        labels.on_or_beside(centre, view.px(0.5), &words, look);
+        let corners = one.space.iter().map(|corner| corner.coords);
+        let middle = corners.sum::<Vector2<f64>>() / one.space.len().max(1) as f64;
+        let thing = (centre, view.px(0.5));
+        labels.on_thing(thing, view.page(middle.into()), &words, look);
     }
 }
 
