@@ -3,15 +3,20 @@
 
 use crate::commands::graph::name_of;
 use dsr::{
-    Attribute, AttributeId, Change, EdgeKey, Element, NodeId, ReadError, Snapshot, Touch, Version,
-    json,
+    Attribute, AttributeId, Change, EdgeKey, Element, NodeId, NodeRef, ReadError, Snapshot, Touch,
+    Version, json,
 };
 use serde_json::{Map, Value as Json, json};
 
 /// The graph after a commit and before it, where they are still kept.
 pub(crate) struct Seen {
+    /// Where it is not kept any more, a newer one, for names alone.
     after: Snapshot,
     before: Option<Snapshot>,
+    /// Whether `after` is what the commit left.
+    is_kept: bool,
+    /// Whether nodes have the names in `after` that they had: it is of the same store.
+    has_names: bool,
 }
 
 /// The word for how something was touched.
@@ -25,13 +30,16 @@ pub(crate) fn touch_name(touch: Touch) -> &'static str {
 }
 
 impl Seen {
-    /// The graph as of that version; the newest where it is not kept any more.
-    pub(crate) fn new(newest: Snapshot, version: Version) -> Self {
-        let before = newest.at(Version(version.0.saturating_sub(1))).ok();
-        Self {
-            after: newest.at(version).unwrap_or(newest),
-            before,
-        }
+    /// The graph as of a commit. Where that is not kept any more, or is another store's, there are no values.
+    pub(crate) fn new(newest: Snapshot, change: &Change) -> Self {
+        let has_names = newest.epoch() == change.epoch;
+        let exact = has_names.then(|| Self::exactly(&newest, change.version).ok());
+        exact.flatten().unwrap_or(Self {
+            after: newest,
+            before: None,
+            is_kept: false,
+            has_names,
+        })
     }
 
     /// The graph as of that version, without what owners give out beside it.
@@ -43,6 +51,8 @@ impl Seen {
         Ok(Self {
             before: newest.at(Version(version.0.saturating_sub(1))).ok(),
             after: newest.at(version)?,
+            is_kept: true,
+            has_names: true,
         })
     }
 
@@ -52,6 +62,9 @@ impl Seen {
 
     /// The name of a node; of one that the commit took away, as it was before.
     pub(crate) fn name(&self, id: NodeId) -> String {
+        if !self.has_names {
+            return NodeRef::Id(id).to_string();
+        }
         let there = |snapshot: &&Snapshot| matches!(snapshot.find_node(id), Ok(Some(_)));
         let snapshot = Some(&self.after).filter(there).or(self.before.as_ref());
         name_of(snapshot.unwrap_or(&self.after), id)
@@ -62,7 +75,7 @@ impl Seen {
         id: NodeId,
         name: AttributeId,
     ) -> Result<Option<Attribute>, ReadError> {
-        match self.after.find_node(id)? {
+        match self.after.find_node(id)?.filter(|_| self.is_kept) {
             Some(node) => node.attribute(name),
             None => Ok(None),
         }
@@ -73,7 +86,7 @@ impl Seen {
         key: EdgeKey,
         name: AttributeId,
     ) -> Result<Option<Attribute>, ReadError> {
-        match self.after.find_edge(key)? {
+        match self.after.find_edge(key)?.filter(|_| self.is_kept) {
             Some(edge) => edge.attribute(name),
             None => Ok(None),
         }
@@ -91,7 +104,8 @@ impl Seen {
             .map(move |&id| (name(id), read(id).ok().flatten()))
     }
 
-    /// The values that a commit left: all of what is new, else what was set; `null` for what was removed.
+    /// The values that a commit left: all of what is new, else what was set; `null` for what was removed, and
+    /// where the version is not kept any more.
     fn values(
         &self,
         element: Option<&Element<'_>>,
@@ -100,6 +114,10 @@ impl Seen {
     ) -> Result<Map<String, Json>, ReadError> {
         let schema = self.after.schema();
         let mut values = Map::new();
+        if !self.is_kept {
+            let names = names.iter().map(|&name| schema.attribute_name(name));
+            return Ok(names.map(|name| (name.to_owned(), Json::Null)).collect());
+        }
         let Some(element) = element else {
             return Ok(values);
         };
@@ -155,10 +173,14 @@ impl Seen {
                 "attributes": self.values(element, touched.touch, &touched.attributes)?,
             }));
         }
-        Ok(json!({
+        let mut row = json!({
             "version": change.version.0, "time": change.time.seconds(),
             "agent": change.agent, "rules": rules.collect::<Vec<_>>(),
             "nodes": nodes, "edges": edges,
-        }))
+        });
+        if !self.is_kept {
+            row["kept"] = json!(false);
+        }
+        Ok(row)
     }
 }

@@ -46,8 +46,8 @@ pub use schema::{
 pub use shm::{
     AttachError, BareClient, BareServer, Changes, ClockError, CommitError, HotAttribute, HotError,
     Instance, InstanceError, LargeAttribute, LargeError, LargeLoan, LargeReadError, LargeSample,
-    Lease, LeaseError, OrphanError, Publisher, Session, Store, StoreError, Subscriber, Tick,
-    Update,
+    Lease, LeaseError, OrphanError, Orphaned, Publisher, Session, Store, StoreError, Subscriber,
+    Tick, Update,
 };
 pub use snapshot::{
     Adjacency, Attribute, Edge, Edges, Element, Neighbors, Node, NodeIds, Snapshot, TransformError,

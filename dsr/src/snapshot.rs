@@ -22,7 +22,7 @@ use crate::hot::Hot;
 use crate::shm::Segment;
 use crate::value::{hash, place};
 use crate::{
-    AttributeId, EdgeKey, LabelId, NodeId, Schema, Time, TypeId, Value, Version, WriterId,
+    AttributeId, EdgeKey, Epoch, LabelId, NodeId, Schema, Time, TypeId, Value, Version, WriterId,
 };
 use std::sync::{Arc, OnceLock};
 
@@ -142,6 +142,11 @@ impl Snapshot {
     pub(crate) fn with_hot(mut self, hot: Option<Hot>) -> Self {
         self.hot = hot;
         self
+    }
+
+    /// The life of the store that it is of.
+    pub fn epoch(&self) -> Epoch {
+        self.arena.epoch().unwrap_or(Epoch(0))
     }
 
     /// The same version without hot values: every attribute is as it was committed, however often

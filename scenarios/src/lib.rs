@@ -21,7 +21,7 @@ pub mod trial;
 pub mod world;
 
 pub use initial_graph::{WORLD, activity_attributes, initial_graph, schema};
-pub use resume::{ResumeError, resume};
+pub use resume::{ResumeError, check_scenario, resume};
 pub use scenario::{LoadError, Scenario};
 pub use tracks::{Tracks, TracksError};
 pub use world::{Inputs, Outputs, Truth, World};

@@ -15,9 +15,7 @@ const WHEREABOUTS: [&str; 2] = ["in", "at"];
 #[derive(Debug, Error)]
 pub enum ResumeError {
     /// The graph is of another world.
-    #[error(
-        "the state is one of scenario `{found}`, not of `{wanted}`; give --state another folder"
-    )]
+    #[error("the graph that is there is one of scenario `{found}`, not of `{wanted}`")]
     OtherScenario {
         /// The scenario that left it.
         found: String,
@@ -39,7 +37,7 @@ pub enum ResumeError {
 /// # Errors
 /// [`ResumeError`].
 pub fn resume(scenario: &Scenario, snapshot: &Snapshot) -> Result<Transaction, ResumeError> {
-    same_scenario(scenario, snapshot)?;
+    check_scenario(scenario, snapshot)?;
     let initial = initial_graph(scenario);
     let mut transaction = Transaction::new();
     forget_missions(snapshot, &mut transaction)?;
@@ -93,7 +91,11 @@ pub fn resume(scenario: &Scenario, snapshot: &Snapshot) -> Result<Transaction, R
     Ok(transaction)
 }
 
-fn same_scenario(scenario: &Scenario, snapshot: &Snapshot) -> Result<(), ResumeError> {
+/// Whether a graph that an earlier run left is one of the scenario.
+///
+/// # Errors
+/// [`ResumeError`].
+pub fn check_scenario(scenario: &Scenario, snapshot: &Snapshot) -> Result<(), ResumeError> {
     let world = snapshot.find_node_by_name(WORLD)?;
     let found = world.map(|world| world.value("scenario")).transpose()?;
     match found.flatten() {

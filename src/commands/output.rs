@@ -6,10 +6,15 @@ use std::fmt;
 use std::io::{IsTerminal, Write};
 
 /// Prints; a reader that went away (`| head`) is no error.
-#[allow(clippy::unnecessary_wraps, reason = "reads as the end of a verb")]
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
-    drop(std::io::stdout().write_all(text.as_bytes()));
-    Ok(())
+    let mut output = std::io::stdout().lock();
+    let printed = output.write_all(text.as_bytes());
+    match printed.and_then(|()| output.flush()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(Failure::internal(
+            format!("cannot write what was asked for: {error}"),
+        )),
+        _ => Ok(()),
+    }
 }
 
 /// Prints JSON for people and machines.

@@ -2,7 +2,9 @@
 
 use crate::cli::Store as Arguments;
 use crate::{Answer, Failure};
-use dsr::{Durability, Graph, Image, Instance, Pace, Schema, State, Store, Turns};
+use dsr::{
+    Durability, Graph, Instance, Pace, Schema, State, Store, StoreError, Transaction, Turns, Value,
+};
 use grammar::Grammar;
 use grammar::live::Published;
 use scenarios::Scenario;
@@ -34,7 +36,10 @@ fn serve(arguments: &Arguments, instance: &Instance, pace: Pace) -> Result<(), F
     let manifests = crate::manifests::load(&scenario.folder, &schema)?;
     let interrupted = super::interruption()?;
     let state = arguments.state.as_deref().map(open_state).transpose()?;
-    let mut store = Store::open(instance, schema).map_err(Failure::internal)?;
+    let mut store = Store::open(instance, schema).map_err(|error| match error {
+        StoreError::InUse { .. } => Failure::input(error),
+        error => Failure::internal(error),
+    })?;
     store.graph_mut().set_rules(Arc::new(grammar.clone()));
     store.graph_mut().set_rights(manifests);
     begin(&mut store, arguments, &scenario, &grammar, state.as_ref())?;
@@ -85,15 +90,22 @@ fn begin(
     grammar: &Grammar,
     state: Option<&State>,
 ) -> Result<(), Failure> {
-    let saved = state.map(State::load).transpose().map_err(Failure::input)?;
-    let saved = saved.flatten();
-    if let Some(image) = orphaned(store, arguments, saved.as_ref())? {
-        store.restore(&image).map_err(no_way_on)?;
+    let left = if arguments.fresh {
+        None
+    } else {
+        store.orphaned(state).map_err(no_way_on)?
+    };
+    if let Some(left) = left {
+        store.take_over(&left).map_err(no_way_on)?;
+        let snapshot = store.graph_mut().snapshot();
+        scenarios::check_scenario(scenario, &snapshot).map_err(no_way_on)?;
         go_by_published(store)?;
-        tracing::info!("version {} goes on from memory", image.version());
-        return Ok(());
+        let version = left.version();
+        tracing::info!("version {version} goes on from memory; --fresh begins without it");
+        return go_by_flags(store, arguments);
     }
-    let mut first = match saved {
+    let saved = state.map(State::load).transpose().map_err(Failure::input)?;
+    let mut first = match saved.flatten() {
         Some(image) => {
             store.restore(&image).map_err(Failure::input)?;
             tracing::info!("version {} goes on from disk", image.version());
@@ -113,28 +125,20 @@ fn begin(
     Ok(())
 }
 
-/// What a store that was killed left in memory, where this one is to go on with it. What is on disk of
-/// the same graph is never newer, unless it went on elsewhere.
-fn orphaned(
-    store: &Store,
-    arguments: &Arguments,
-    saved: Option<&Image>,
-) -> Result<Option<Image>, Failure> {
-    if arguments.fresh {
-        return Ok(None);
+/// Makes the graph say what this start's flags say.
+fn go_by_flags(store: &mut Store, arguments: &Arguments) -> Result<(), Failure> {
+    let snapshot = store.graph_mut().snapshot();
+    let world = snapshot.find_node_by_name(scenarios::WORLD);
+    let world = world.map_err(Failure::internal)?;
+    let social = world.map(|world| world.value("social")).transpose();
+    let social = social.map_err(Failure::internal)?.flatten();
+    if social != Some(Value::Bool(!arguments.no_social)) {
+        let mut flags = Transaction::new();
+        flags.set(scenarios::WORLD, "social", !arguments.no_social);
+        let committed = store.commit(&flags, snapshot.time());
+        committed.map_err(Failure::internal)?;
     }
-    let Some(image) = store.orphaned().map_err(no_way_on)? else {
-        return Ok(None);
-    };
-    match saved {
-        Some(saved) if saved.lineage() != image.lineage() => Err(no_way_on(format!(
-            "a store that was killed left version {} of a graph in memory, and the state folder \
-             has another graph",
-            image.version()
-        ))),
-        Some(saved) if saved.version() > image.version() => Ok(None),
-        _ => Ok(Some(image)),
-    }
+    Ok(())
 }
 
 /// What a killed store left stands in the way.

@@ -169,9 +169,10 @@ fn a_killed_store_is_replaced_without_losing_a_commit_and_agents_find_the_new_on
     // What it left is all that this process still sees.
     assert_eq!(instance.0.orphaned().unwrap(), Some(Version(51)));
     let mut store = Store::open(&instance.0, Schema::open()).unwrap();
-    let image = store.orphaned().unwrap().unwrap();
-    assert_eq!(image, Image::of(&session.snapshot().unwrap()).unwrap());
-    store.restore(&image).unwrap();
+    let left = store.orphaned(None).unwrap().unwrap();
+    let image = Image::of(&session.snapshot().unwrap()).unwrap();
+    assert_eq!(left.image(), &image);
+    store.take_over(&left).unwrap();
     // Until the new store shows its graph, the old one is read.
     assert_eq!(session.epoch().unwrap(), old);
     let transaction = {

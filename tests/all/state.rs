@@ -207,9 +207,21 @@ impl ByHand {
     }
 }
 
+impl ByHand {
+    /// Ends it as a person does.
+    fn end(mut self) {
+        rustix::process::kill_process(
+            rustix::process::Pid::from_child(&self.0),
+            rustix::process::Signal::INT,
+        )
+        .unwrap();
+        assert!(self.0.wait().unwrap().success());
+    }
+}
+
 impl Drop for ByHand {
     fn drop(&mut self) {
-        self.0.kill().unwrap();
+        drop(self.0.kill());
         self.0.wait().unwrap();
     }
 }
@@ -318,25 +330,76 @@ fn a_store_by_hand_that_was_killed_leaves_its_graph_to_the_next_by_hand() {
     let mut session = Session::attach(&instance.0, "cortex-graph", PATIENCE).unwrap();
     assert_eq!(session.snapshot().unwrap().version(), last.version);
     drop((store, session));
-    // A folder with another graph is not written over, and may be meant.
+    // What ends well leaves nothing, and nothing older comes back.
+    let store = ByHand::start(&instance, &[]);
+    let session = Session::attach(&instance.0, "cortex-graph", PATIENCE).unwrap();
+    assert_eq!(instance.0.orphaned().unwrap(), None);
+    drop(session);
+    store.end();
+    assert_eq!(
+        instance.0.shared_memory().unwrap(),
+        Vec::<std::path::PathBuf>::new()
+    );
+}
+
+#[test]
+fn an_instance_has_one_store_and_goes_on_with_its_own_scenario_and_its_own_state() {
+    let instance = TestInstance::new("one");
+    let store = ByHand::start(&instance, &[]);
+    let mut session = Session::attach(&instance.0, "cortex-graph", PATIENCE).unwrap();
+    let set = |session: &mut Session, speed: f64| {
+        let mut transaction = Transaction::new();
+        transaction.set("robot", "max_speed", speed);
+        session.commit(&transaction, Time::default()).unwrap()
+    };
+    let commit = set(&mut session, 0.123);
+    let flags = ["--instance", instance.name()];
+    let here = [
+        &["store", "--scenario", "scenarios/care-centre"],
+        &flags[..],
+    ]
+    .concat();
+    let said = refused(&here);
+    assert!(said.contains("has a store already"), "{said}");
+    assert_eq!(session.snapshot().unwrap().version(), commit.version);
+    drop((store, session));
+    // Another scenario's graph is not taken for one's own.
+    let elsewhere = ["store", "--scenario", "scenarios/apartment"];
+    let said = refused(&[&elsewhere[..], &flags].concat());
+    assert!(
+        said.contains("care-centre") && said.contains("--fresh"),
+        "{said}"
+    );
+    // A folder that another instance went on from has commits that the memory does not have.
     let folder = TempDir::new().unwrap();
     let state = folder.path().join("state");
     let state = state.to_str().unwrap();
-    let other = TestInstance::new("left-too");
-    let store = ByHand::start(&other, &["--state", state, "--durable"]);
-    let mut session = Session::attach(&other.0, "cortex-graph", PATIENCE).unwrap();
-    let kept = set(&mut session, 0.2);
+    let keep = ["--state", state, "--durable"];
+    let store = ByHand::start(&instance, &keep);
+    let mut session = Session::attach(&instance.0, "cortex-graph", PATIENCE).unwrap();
+    set(&mut session, 0.15);
     drop((store, session));
-    let second = ["store", "--scenario", "scenarios/care-centre"];
-    let flags = ["--instance", instance.name(), "--state", state];
-    let said = refused(&[&second[..], &flags].concat());
+    // Of the same life: goes on with the memory.
+    let store = ByHand::start(&instance, &keep);
+    let session = Session::attach(&instance.0, "cortex-graph", PATIENCE).unwrap();
+    drop((store, session));
+    let other = TestInstance::new("one-too");
+    let store = ByHand::start(&other, &keep);
+    let mut session = Session::attach(&other.0, "cortex-graph", PATIENCE).unwrap();
+    let durable = set(&mut session, 0.99);
+    assert!(durable.durable);
+    drop((store, session));
+    let said = refused(&[&here[..], &keep].concat());
     assert!(
         said.contains("another graph") && said.contains("--fresh"),
         "{said}"
     );
     let store = ByHand::start(&instance, &["--state", state, "--fresh"]);
     let mut session = Session::attach(&instance.0, "cortex-graph", PATIENCE).unwrap();
-    assert!(session.snapshot().unwrap().version() > kept.version);
-    assert_eq!(instance.0.orphaned().unwrap(), None);
+    let snapshot = session.snapshot().unwrap();
+    assert!(snapshot.version() >= durable.version);
+    let robot = snapshot.find_node_by_name("robot").unwrap().unwrap();
+    // What the scenario's files say is laid over what the folder has.
+    assert!(robot.value("max_speed").unwrap().is_some());
     drop((store, session));
 }

@@ -72,8 +72,8 @@ fn end_of_input() -> Arc<AtomicBool> {
 /// Serves; from an image, if there is one.
 fn store(instance: &Instance) -> Outcome {
     let mut store = Store::open(instance, Schema::open())?;
-    if let Some(image) = store.orphaned()? {
-        store.restore(&image)?;
+    if let Some(left) = store.orphaned(None)? {
+        store.take_over(&left)?;
     }
     // Little history, so that memory of old versions is reused under slow readers.
     store.graph_mut().set_limits(dsr::Limits {

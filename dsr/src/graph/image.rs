@@ -4,8 +4,8 @@
 
 use super::{Answered, Graph, apply};
 use crate::{
-    Attribute, AttributeId, Edge, EdgeKey, Epoch, Node, NodeId, ReadError, Refusal, Schema,
-    Snapshot, Time, TypeId, Value, Version,
+    Attribute, AttributeId, Edge, EdgeKey, Node, NodeId, ReadError, Refusal, Schema, Snapshot,
+    Time, TypeId, Value, Version,
 };
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -144,9 +144,9 @@ impl Image {
         self.frame.version
     }
 
-    /// The first life of the store of the graph that this is a version of.
-    pub fn lineage(&self) -> Epoch {
-        Epoch(self.frame.lineage)
+    /// Its schema.
+    pub fn schema(&self) -> &Schema {
+        &self.schema
     }
 
     /// Its time.

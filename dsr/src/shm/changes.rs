@@ -16,7 +16,8 @@ pub enum Update {
     Gap(Version),
 }
 
-/// A subscription to commits.
+/// A subscription to commits. What a store had committed and not handed out when it was killed is a gap: it
+/// is told with the next commit, or before that, once the session has looked at the new store's graph.
 #[derive(Debug)]
 pub struct Changes {
     pub(super) subscriber: Subscriber<Vec<Change>>,
@@ -28,6 +29,8 @@ pub struct Changes {
     /// The first life of the store of the graph that it follows, where that is known.
     pub(super) lineage: Option<u64>,
     pub(super) seen: Version,
+    /// Lives of the store that were followed before: a gap stands for whatever of them comes late.
+    pub(super) past: Vec<Epoch>,
 }
 
 impl Changes {
@@ -58,6 +61,7 @@ impl Changes {
     /// this process sees it.
     fn turn_to(&mut self, epoch: Epoch) -> bool {
         let before = self.lineage;
+        self.past.push(self.epoch);
         self.epoch = epoch;
         self.lineage = self.current.arena().and_then(|arena| {
             let root = arena.newest_root().ok()?;
@@ -100,7 +104,8 @@ impl Changes {
                 continue;
             };
             // What the subscription started from is known already; another store's is not.
-            if change.epoch == self.epoch && change.version <= self.seen {
+            let is_known = change.epoch == self.epoch && change.version <= self.seen;
+            if is_known || self.past.contains(&change.epoch) {
                 continue;
             }
             let same = change.epoch == self.epoch || self.turn_to(change.epoch);

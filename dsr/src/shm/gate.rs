@@ -35,12 +35,13 @@ pub(crate) struct Gate {
     _lock: File,
 }
 
+/// Locks a file or folder, which takes as long as another has it locked. `None` where that is seconds.
 #[allow(
     clippy::disallowed_methods,
     reason = "a lock cannot be waited for with a time limit otherwise"
 )]
-fn lock(folder: &Path) -> io::Result<Option<Gate>> {
-    let file = File::open(folder)?;
+pub(super) fn lock(path: &Path) -> io::Result<Option<Gate>> {
+    let file = File::open(path)?;
     let deadline = Instant::now() + PATIENCE;
     while flock(&file, FlockOperation::NonBlockingLockExclusive).is_err() {
         if Instant::now() > deadline {
@@ -48,8 +49,8 @@ fn lock(folder: &Path) -> io::Result<Option<Gate>> {
         }
         std::thread::sleep(LOOK);
     }
-    // Whoever held it may have removed the folder.
-    let same = fs::metadata(folder).is_ok_and(|now| {
+    // Whoever held it may have removed what it is on.
+    let same = fs::metadata(path).is_ok_and(|now| {
         file.metadata()
             .is_ok_and(|then| (then.dev(), then.ino()) == (now.dev(), now.ino()))
     });

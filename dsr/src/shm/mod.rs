@@ -34,7 +34,7 @@ pub use lease::{Lease, LeaseError};
 pub use orphan::OrphanError;
 pub(crate) use segment::{Segment, Segments};
 pub use session::{AttachError, ClockError, CommitError, Session, Tick};
-pub use store::{Store, StoreError};
+pub use store::{Orphaned, Store, StoreError};
 
 use gate::{one_at_a_time, port};
 use iceoryx2::port::listener::{Listener, ListenerWaitError};

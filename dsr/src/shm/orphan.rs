@@ -3,7 +3,7 @@
 //! was at when it was killed.
 //!
 //! Shared memory outlives the process that made it, until it is removed. Before anybody cleans up after a
-//! killed store, its graph's memory gets a second name, which goes when another store shows its graph.
+//! killed store, its graph's memory gets a second name; both names go when another store shows its graph.
 
 use super::arena::{CAPACITY, SHIFT, SegmentHeader};
 use super::leftovers::{Members, name_of, processes_in, remove};
@@ -39,6 +39,14 @@ pub enum OrphanError {
         /// What the operating system said.
         source: io::Error,
     },
+    /// Its memory begins with something else than this program writes.
+    #[error(
+        "the graph that a killed store left is damaged, or of another version of this program: {path}"
+    )]
+    Foreign {
+        /// The file in shared memory.
+        path: PathBuf,
+    },
     /// A part of its memory is not there, or not what a store writes.
     #[error("the graph that a killed store left is damaged: {0}")]
     Damaged(#[from] ReadError),
@@ -62,6 +70,8 @@ struct First {
     head: Version,
     /// Bytes before it.
     start: u64,
+    /// Whether the epoch is the same before it and in it.
+    is_whole: bool,
 }
 
 /// The graphs that are in an instance's memory, the newest last; the second name of one after its first.
@@ -81,12 +91,7 @@ fn graphs(config: &Config) -> Vec<Orphan> {
 /// Gives the newest graph a second name if its store has ended, for as long as it is the newest. To be
 /// called before anything is removed of those that have ended.
 pub(super) fn keep(config: &Config) -> Result<(), InstanceError> {
-    let mut graphs = graphs(config);
-    let newest = graphs.pop();
-    for old in graphs.iter().filter(|graph| graph.is_kept()) {
-        remove(&old.path);
-    }
-    let Some(newest) = newest.filter(|graph| !graph.is_kept()) else {
+    let Some(newest) = graphs(config).pop().filter(|graph| !graph.is_kept()) else {
         return Ok(());
     };
     if newest.is_left(&Members::of(config)?) {
@@ -99,6 +104,13 @@ pub(super) fn keep(config: &Config) -> Result<(), InstanceError> {
         }
     }
     Ok(())
+}
+
+/// Removes the graphs of other lives of the store than that one, which has shown its own.
+pub(super) fn forget(config: &Config, epoch: Epoch) {
+    for old in graphs(config).iter().filter(|graph| graph.epoch() != epoch) {
+        remove(&old.path);
+    }
 }
 
 impl Orphan {
@@ -142,6 +154,10 @@ impl Orphan {
         let arena = Arena::new(CAPACITY, SHIFT);
         let mut start = self.first.start;
         arena.attach(0, segment(&file, start).map_err(io)?);
+        if !self.first.is_whole || arena.epoch() != Some(self.first.epoch) {
+            let path = self.path.clone();
+            return Err(OrphanError::Foreign { path });
+        }
         for index in 1..arena.announced_segments().min(CAPACITY as u64) {
             let next = next(&file, start + SEGMENT, self.first.epoch, index).map_err(io)?;
             start = next.ok_or(ReadError::Damaged {
@@ -201,14 +217,15 @@ fn first(file: &File) -> io::Result<Option<First>> {
     let words = beginning(file, 0)?;
     let found = words.windows(6).enumerate().find_map(|(at, window)| {
         // What is written into the arena's first words is in the file `arena/mod.rs`.
-        let &[.., magic, _, epoch, head] = window else {
+        let &[sample, index, magic, _, epoch, head] = window else {
             return None;
         };
-        let right = magic == MAGIC && window.starts_with(&header(Epoch(epoch), 0));
-        right.then_some(First {
-            epoch: Epoch(epoch),
+        (magic == MAGIC && index == 0).then_some(First {
+            // That of the sample: the arena's own is looked at when it is read.
+            epoch: Epoch(sample),
             head: Version(head),
             start: ((at + 2) * WORD) as u64,
+            is_whole: sample == epoch,
         })
     });
     Ok(found)
@@ -260,6 +277,7 @@ fn segment(file: &File, start: u64) -> io::Result<Segment> {
 mod tests {
     use super::*;
     use crate::{Graph, Schema, Time, Transaction};
+    use proptest::prelude::*;
 
     /// A file that nobody else sees, as sparse as shared memory is.
     fn file() -> File {
@@ -289,14 +307,44 @@ mod tests {
             file.set_len(start + SEGMENT).unwrap();
             assert_eq!(orphan(&file), None, "there is nothing yet");
             put(&file, &words, start);
-            assert_eq!(orphan(&file), None, "no header is before it");
+            assert!(!orphan(&file).unwrap().is_whole, "no header is before it");
             put(&file, &header(epoch, 0), start - 16);
             let found = orphan(&file).unwrap();
-            assert_eq!((found.epoch, found.head, found.start), (epoch, head, start));
+            let expected = First {
+                epoch,
+                head,
+                start,
+                is_whole: true,
+            };
+            assert_eq!(found, expected);
             let arena = Arena::new(CAPACITY, SHIFT);
             arena.attach(0, segment(&file, start).unwrap());
             let snapshot = Snapshot::of_arena(Arc::new(arena)).unwrap();
             assert!(snapshot.find_node_by_name("a").unwrap().is_some());
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn no_words_make_it_panic_or_go_on_for_ever(
+            mut found in prop::collection::vec(any::<u64>(), 0..600),
+            header in 0usize..600,
+            index in 0u64..3,
+        ) {
+            let epoch = 7;
+            for (word, value) in found.iter_mut().skip(header).zip([epoch, index, MAGIC]) {
+                *word = value;
+            }
+            let file = file();
+            put(&file, &found, 0);
+            file.set_len(2 * SEGMENT).unwrap();
+            if let Some(first) = first(&file).unwrap() {
+                let arena = Arena::new(CAPACITY, SHIFT);
+                arena.attach(0, segment(&file, first.start).unwrap());
+                prop_assert!(Snapshot::of_arena(Arc::new(arena)).is_err());
+            }
+            next(&file, SEGMENT, Epoch(epoch), index).unwrap();
         }
     }
 

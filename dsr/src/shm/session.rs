@@ -330,15 +330,15 @@ impl Session {
     pub fn changes(&mut self, filter: Filter) -> Result<Changes, AttachError> {
         let subscriber = Subscriber::open(&self.node, CHANGES)?;
         let snapshot = self.snapshot()?;
-        let epoch = snapshot.arena.epoch();
         Ok(Changes {
             subscriber,
             waiting: VecDeque::new(),
             current: self.arena.current.clone(),
             filter,
-            epoch: epoch.ok_or_else(|| self.no_store())?,
+            epoch: snapshot.epoch(),
             lineage: Some(snapshot.root.lineage),
             seen: snapshot.version(),
+            past: Vec::new(),
         })
     }
 

@@ -6,10 +6,13 @@ mod desks;
 mod durable;
 mod news;
 
+pub use durable::Orphaned;
+
 use super::arena::ArenaPublisher;
+use super::gate::{self, Gate};
 use super::lease::Landlord;
 use super::leftovers::Cleaner;
-use super::orphan::{Orphan, OrphanError};
+use super::orphan::{self, Orphan, OrphanError};
 use super::presence::Names;
 use super::session::{ANSWERS, CHANGES, NEWS, REQUESTS_EVENT, Request, event, requests};
 use super::{Instance, InstanceError, Ipc, IpcNode, Publisher, bell, ipc, now, pause, wait};
@@ -28,6 +31,8 @@ use iceoryx2::port::server::Server;
 use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
 use news::News;
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::os::unix::fs::OpenOptionsExt;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use thiserror::Error;
 
@@ -49,6 +54,20 @@ pub enum StoreError {
     /// The operating system gave no thread.
     #[error("the state cannot be kept: {0}")]
     Thread(std::io::Error),
+    /// The instance has a store.
+    #[error("instance `{instance}` has a store already; end it, or use another instance")]
+    InUse {
+        /// The instance's name.
+        instance: String,
+    },
+    /// What a killed store left in memory and what is in the state folder went different ways.
+    #[error(
+        "a killed store left version {version} of a graph in memory, and the state folder has another graph"
+    )]
+    Diverged {
+        /// The version in memory.
+        version: Version,
+    },
     /// What a killed store left cannot be read.
     #[error(transparent)]
     Orphan(#[from] OrphanError),
@@ -112,6 +131,8 @@ pub struct Store {
     last_time: Time,
     keeper: Option<Keeper>,
     durability: Durability,
+    /// What it went on from in memory: a killed store's life, and its last version.
+    from: Option<(Epoch, Version)>,
     /// Who is to be told of a commit once it is on disk.
     waiting: Vec<Waiting>,
     spin: Duration,
@@ -122,6 +143,24 @@ pub struct Store {
     newcomers_at: Instant,
     // Dropped last: the ports above belong to it.
     node: IpcNode,
+    /// That it is the instance's only store. The kernel gives it back where the process is killed.
+    _lock: Gate,
+}
+
+/// Makes sure that an instance has one store. One that was just killed may take a moment to be gone.
+fn lock_for_store(instance: &Instance) -> Result<Gate, StoreError> {
+    let path = instance.folder().join("store.lock");
+    let made = File::options()
+        .create(true)
+        .truncate(false)
+        .write(true)
+        .mode(0o600)
+        .open(&path);
+    let locked = made.and_then(|_| gate::lock(&path));
+    let locked = locked.map_err(|source| InstanceError::Io { path, source })?;
+    locked.ok_or_else(|| StoreError::InUse {
+        instance: instance.name().to_owned(),
+    })
 }
 
 impl Store {
@@ -132,6 +171,8 @@ impl Store {
     pub fn open(instance: &Instance, schema: Schema) -> Result<Self, StoreError> {
         instance.create_folder()?;
         let node = instance.join()?;
+        // As a member: nobody removes the folder any more.
+        let lock = lock_for_store(instance)?;
         // A store that was killed has left its ports behind, which count.
         let cleaner = Cleaner::start(&node).map_err(StoreError::Cleaner)?;
         let arena = ArenaPublisher::open(&node)?;
@@ -179,26 +220,15 @@ impl Store {
             last_time,
             keeper: None,
             durability: Durability::InMemory,
+            from: None,
             waiting: Vec::new(),
             spin: SPIN,
             announced: false,
             awake_until: now(),
             newcomers_at: now(),
             node,
+            _lock: lock,
         })
-    }
-
-    /// The graph of the store before this one, if that was killed and its memory is still there: its last
-    /// committed version. It stays there until this store serves for the first time.
-    ///
-    /// # Errors
-    /// [`StoreError::Orphan`] where it cannot be read.
-    pub fn orphaned(&self) -> Result<Option<Image>, StoreError> {
-        let Some(orphan) = Orphan::find(self.node.config())? else {
-            return Ok(None);
-        };
-        let image = Image::of(&orphan.read()?).map_err(OrphanError::from)?;
-        Ok(Some(image))
     }
 
     /// Fills the empty graph with what another store's memory held; versions go on from there.
@@ -308,6 +338,8 @@ impl Store {
             pause(NEWS);
             self.graph.announce();
             self.announced = true;
+            // This one has all that is worth having of it.
+            orphan::forget(self.node.config(), self.graph.epoch());
         }
         loop {
             let mut served = self.answer_desks();

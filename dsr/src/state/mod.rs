@@ -2,31 +2,34 @@
 //! version. This file guarantees that the folder always holds a whole version: each group of
 //! commits replaces the one before it in a single transaction of the database.
 
+mod error;
 mod keeper;
 #[cfg(test)]
 mod tests;
 
+pub use error::StateError;
 pub(crate) use keeper::Keeper;
 
 use crate::graph::{EdgeImage, Frame, Image, NodeImage};
-use crate::{EdgeKey, LabelId, NodeId, ReadError, Schema, Snapshot, Version};
+use crate::{EdgeKey, Epoch, LabelId, NodeId, ReadError, Schema, Snapshot, Version};
 use redb::backends::FileBackend;
 use redb::{
     Database, DatabaseError, ReadableDatabase, ReadableTable, StorageError, TableDefinition,
     TableError,
 };
 use rustix::fs::{FlockOperation, flock};
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::fs;
 use std::io;
 use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
-use thiserror::Error;
 
 /// What the rows mean; another number is another meaning.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
+/// The format before it, which has no [`about::LIFE`].
+const WITHOUT_LIFE: u32 = 2;
 /// The database's name in the folder.
 const FILE: &str = "graph.redb";
 /// The name of one that is being made.
@@ -51,72 +54,18 @@ mod about {
     pub(super) const FORMAT: &str = "format";
     /// [`super::Frame`].
     pub(super) const FRAME: &str = "frame";
+    /// [`super::Life`].
+    pub(super) const LIFE: &str = "life";
     /// [`super::Schema`].
     pub(super) const SCHEMA: &str = "schema";
 }
 
-/// Why a state folder cannot be used.
-#[derive(Debug, Error)]
-pub enum StateError {
-    /// The operating system said no.
-    #[error("cannot use {path}: {source}")]
-    Io {
-        /// The file or folder.
-        path: PathBuf,
-        /// What it said.
-        source: io::Error,
-    },
-    /// The folder holds something else.
-    #[error("{path} is not a state folder of cortex; give --state an empty or a new folder")]
-    Foreign {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// Other users may put another file in the place of the database.
-    #[error(
-        "others than its owner can write to {path}; `chmod go-w` it, or give --state another folder"
-    )]
-    Shared {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// Another store has it open.
-    #[error(
-        "{path} is in use by another store; end that one first, or give --state another folder"
-    )]
-    InUse {
-        /// The database.
-        path: PathBuf,
-    },
-    /// It was written by a version of the program that gives its rows another meaning.
-    #[error("{path} has format {found}, and this program reads format {FORMAT}")]
-    Format {
-        /// The database.
-        path: PathBuf,
-        /// Its format.
-        found: u32,
-    },
-    /// It holds what no store writes.
-    #[error("{path} is damaged: {reason}; restore it from a copy, or move it away to begin anew")]
-    Damaged {
-        /// The database.
-        path: PathBuf,
-        /// What is wrong.
-        reason: String,
-    },
-    /// The folder has a newer version than the graph that shall go on from it.
-    #[error("{path} has version {saved}, and the graph only version {given}")]
-    Newer {
-        /// The database.
-        path: PathBuf,
-        /// Its version.
-        saved: Version,
-        /// The graph's.
-        given: Version,
-    },
-    /// The graph's memory cannot be read.
-    #[error(transparent)]
-    Read(#[from] ReadError),
+/// Which life of the store wrote a folder last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Life {
+    pub(crate) epoch: Epoch,
+    /// What it went on from, if that was in memory: a life that was killed, and its last version.
+    pub(crate) from: Option<(Epoch, Version)>,
 }
 
 /// Rows to write: all that the commits of a group touched, as the last of them left it.
@@ -212,7 +161,7 @@ impl State {
 
     fn check_format(&self) -> Result<(), StateError> {
         match self.find_about::<u32>(about::FORMAT)? {
-            Some(FORMAT) => Ok(()),
+            Some(FORMAT | WITHOUT_LIFE) => Ok(()),
             Some(found) => Err(StateError::Format {
                 path: self.path.clone(),
                 found,
@@ -278,12 +227,23 @@ impl State {
         }))
     }
 
-    /// Makes the folder hold `image`, whatever it held before; rows that are the same already
+    /// Whether a graph was ever written to the folder.
+    pub(crate) fn holds_graph(&self) -> Result<bool, StateError> {
+        Ok(self.find_about::<Frame>(about::FRAME)?.is_some())
+    }
+
+    /// Which life of the store wrote the folder last; `None` where nothing was written to it yet, or by an
+    /// older version of this program.
+    pub(crate) fn life(&self) -> Result<Option<Life>, StateError> {
+        self.find_about(about::LIFE)
+    }
+
+    /// Makes the folder hold `image`, of that life of the store, whatever it held before; rows that are the same already
     /// stay.
     ///
     /// # Errors
     /// [`StateError::Newer`] where it held a newer version; [`StateError::Io`].
-    pub fn replace(&mut self, image: &Image) -> Result<(), StateError> {
+    pub(crate) fn replace(&mut self, image: &Image, life: Life) -> Result<(), StateError> {
         let saved = self.find_about::<Frame>(about::FRAME)?;
         if let Some(saved) = saved.map(|frame| frame.version)
             && saved > image.version()
@@ -322,6 +282,12 @@ impl State {
             }
         }
         self.write_about(&write, &image.frame, Some(&image.schema))?;
+        {
+            let mut table = self.done(write.open_table(ABOUT))?;
+            let (format, life) = (self.encode(&FORMAT)?, self.encode(&life)?);
+            self.done(table.insert(about::FORMAT, format.as_slice()))?;
+            self.done(table.insert(about::LIFE, life.as_slice()))?;
+        }
         self.done(write.commit())
     }
 

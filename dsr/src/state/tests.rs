@@ -9,6 +9,10 @@ use std::io::{Read, Seek, SeekFrom, Write};
 use std::time::Duration;
 use tempfile::TempDir;
 
+const LIFE: Life = Life {
+    epoch: Epoch(1),
+    from: None,
+};
 const NEVER: Duration = Duration::from_hours(1);
 
 fn image(graph: &Graph) -> Image {
@@ -52,7 +56,7 @@ fn small_state() -> (TempDir, Graph) {
     thing(&mut graph, "one").unwrap();
     State::open(folder.path())
         .unwrap()
-        .replace(&image(&graph))
+        .replace(&image(&graph), LIFE)
         .unwrap();
     (folder, graph)
 }
@@ -68,7 +72,7 @@ proptest! {
         let mut state = State::open(folder.path()).unwrap();
         prop_assert!(state.load().unwrap().is_none());
         let mut graph = Graph::in_memory(Schema::open());
-        state.replace(&image(&graph)).unwrap();
+        state.replace(&image(&graph), LIFE).unwrap();
         let mut schema_version = graph.snapshot().root.schema_version;
         for operations in groups {
             let (nodes, edges) = touched(&commit(&mut graph, operations));
@@ -90,7 +94,7 @@ proptest! {
             let name = format!("other{}", other.snapshot().version());
             thing(&mut other, &name).unwrap();
         }
-        state.replace(&image(&other)).unwrap();
+        state.replace(&image(&other), LIFE).unwrap();
         prop_assert_eq!(state.load().unwrap().unwrap(), image(&other));
     }
 
@@ -103,7 +107,7 @@ proptest! {
         // No history at all: every commit takes the memory of the version before it.
         graph.set_limits(crate::Limits { history_bytes: 0, ..crate::Limits::default() });
         let mut state = State::open(folder.path()).unwrap();
-        state.replace(&image(&graph)).unwrap();
+        state.replace(&image(&graph), LIFE).unwrap();
         let keeper = Keeper::start(state, &graph.snapshot(), Duration::ZERO, Box::new(|| ()));
         let keeper = keeper.unwrap();
         for operation in operations {
@@ -218,7 +222,7 @@ fn a_folder_of_another_format_is_refused_with_both_numbers() {
     assert!(
         error
             .to_string()
-            .ends_with("has format 7, and this program reads format 2"),
+            .ends_with("has format 7, and this program reads format 3"),
         "{error}"
     );
 }
@@ -229,8 +233,8 @@ fn an_older_graph_does_not_replace_a_newer_one() {
     let older = image(&graph);
     thing(&mut graph, "two").unwrap();
     let mut state = State::open(folder.path()).unwrap();
-    state.replace(&image(&graph)).unwrap();
-    let error = state.replace(&older).unwrap_err();
+    state.replace(&image(&graph), LIFE).unwrap();
+    let error = state.replace(&older, LIFE).unwrap_err();
     assert!(matches!(error, StateError::Newer { .. }), "{error}");
     assert_eq!(state.load().unwrap().unwrap(), image(&graph));
 }
@@ -269,7 +273,7 @@ fn a_file_that_was_once_large_is_made_small_again() {
             .unwrap();
     }
     let mut state = State::open(folder.path()).unwrap();
-    state.replace(&image(&graph)).unwrap();
+    state.replace(&image(&graph), LIFE).unwrap();
     let mut transaction = Transaction::new();
     // The last stays, and may lie at the end of the file.
     for i in 0..89 {
@@ -278,7 +282,7 @@ fn a_file_that_was_once_large_is_made_small_again() {
     graph
         .commit(&transaction, "agent", Time::default())
         .unwrap();
-    state.replace(&image(&graph)).unwrap();
+    state.replace(&image(&graph), LIFE).unwrap();
     drop(state);
     let bytes = || fs::metadata(folder.path().join(FILE)).unwrap().len();
     let before = bytes();
@@ -299,7 +303,7 @@ fn a_damaged_file_is_told_and_never_read_wrongly() {
         thing(&mut graph, &format!("node{i}")).unwrap();
     }
     let mut state = State::open(folder.path()).unwrap();
-    state.replace(&image(&graph)).unwrap();
+    state.replace(&image(&graph), LIFE).unwrap();
     drop(state);
     let path = folder.path().join(FILE);
     let whole = fs::read(&path).unwrap();

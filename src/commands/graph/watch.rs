@@ -78,7 +78,7 @@ pub(super) fn watch(source: &GraphSource, arguments: &Watch) -> Result<Answer, F
             Some(Update::Change(change)) => {
                 left -= 1;
                 let newest = session.snapshot().map_err(Failure::internal)?;
-                let seen = Seen::new(newest, change.version);
+                let seen = Seen::new(newest, &change);
                 let text = if source.json {
                     seen.row(&change).map_err(Failure::internal)?.to_string()
                 } else {

@@ -1,14 +1,36 @@
-//! What a store does with a state folder. This file guarantees that a commit which is to be durable is
-//! acknowledged once it is on disk, and not before.
+//! What a store does with a state folder, and with what a killed store left in memory. This file guarantees
+//! that a commit which is to be durable is acknowledged once it is on disk, and not before; and that none
+//! which was acknowledged as durable is lost to an older graph in memory.
 
+use super::super::orphan::{Orphan, OrphanError};
 use super::super::session::{REQUESTS_EVENT, event};
 use super::super::{InstanceError, ipc};
 use super::answer::reply;
 use super::{Store, StoreError, Waiting};
 use crate::graph::Image;
-use crate::state::Keeper;
-use crate::{Durability, Refusal, State, StateError, Transaction};
+use crate::state::{Keeper, Life};
+use crate::{Durability, Epoch, Refusal, State, StateError, Transaction, Version};
 use std::time::Duration;
+
+/// What a killed store left in memory.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Orphaned {
+    image: Image,
+    /// Its store's life and last version.
+    last: (Epoch, Version),
+}
+
+impl Orphaned {
+    /// Its last version.
+    pub fn version(&self) -> Version {
+        self.last.1
+    }
+
+    /// The graph.
+    pub fn image(&self) -> &Image {
+        &self.image
+    }
+}
 
 impl Store {
     /// From now on keeps the graph in a state folder, which first becomes what the graph is now.
@@ -26,7 +48,11 @@ impl Store {
         durability: Durability,
     ) -> Result<(), StoreError> {
         let snapshot = self.graph.snapshot();
-        state.replace(&Image::of(&snapshot).map_err(StateError::from)?)?;
+        let life = Life {
+            epoch: self.graph.epoch(),
+            from: self.from,
+        };
+        state.replace(&Image::of(&snapshot).map_err(StateError::from)?, life)?;
         let bell = event(&self.node, REQUESTS_EVENT)?
             .notifier_builder()
             .create()
@@ -39,6 +65,41 @@ impl Store {
         let keeper = Keeper::start(state, &snapshot, interval, Box::new(bell));
         self.keeper = Some(keeper.map_err(StoreError::Thread)?);
         self.durability = durability;
+        Ok(())
+    }
+
+    /// The graph of the store before this one, if that was killed and its memory is still there: its last
+    /// committed version. `None` also where the state folder has all of it.
+    ///
+    /// # Errors
+    /// [`StoreError::Orphan`] where it cannot be read; [`StoreError::Diverged`] where the folder has something
+    /// else.
+    pub fn orphaned(&self, state: Option<&State>) -> Result<Option<Orphaned>, StoreError> {
+        let Some(orphan) = Orphan::find(self.node.config())? else {
+            return Ok(None);
+        };
+        let last = (orphan.epoch(), orphan.version());
+        if let Some(state) = state
+            && state.holds_graph()?
+        {
+            match state.life()? {
+                // The memory is never behind the disk.
+                Some(life) if life.epoch == last.0 => {}
+                Some(life) if life.from == Some(last) => return Ok(None),
+                _ => return Err(StoreError::Diverged { version: last.1 }),
+            }
+        }
+        let image = Image::of(&orphan.read()?).map_err(OrphanError::from)?;
+        Ok(Some(Orphaned { image, last }))
+    }
+
+    /// Fills the empty graph with what a killed store left; versions go on from there.
+    ///
+    /// # Errors
+    /// [`StoreError::Refused`].
+    pub fn take_over(&mut self, orphaned: &Orphaned) -> Result<(), StoreError> {
+        self.restore(&orphaned.image)?;
+        self.from = Some(orphaned.last);
         Ok(())
     }
 
