@@ -100,7 +100,7 @@ pub use grammar::{
 pub use load::{Defects, Loader, SHOWN_LIMIT, has_errors, load_grammar, parse_goal, parse_grammar};
 pub use matching::{
     CHOICE_LIMIT, End, MatchDelta, MatchError, Matcher, Matches, Obstacle, RuleMatch, SEARCH_LIMIT,
-    SearchPlan, SearchStep, ValueError, WHOLE_LIMIT, Watch,
+    SearchPlan, SearchStep, SharedSteps, ValueError, WHOLE_LIMIT, Watch,
 };
 pub use number::Number;
 pub use parser::DEPTH_LIMIT;

@@ -467,6 +467,23 @@ changeRoom, by the graph's counts: cost 4.3
     assert_eq!((code, out.contains("no world was given")), (0, true));
 }
 
+#[test]
+fn explain_shows_which_rules_share_steps_when_they_are_watched() {
+    let text = "name=x\n===\n\
+                go : active(1) { { r:robot a:room b:room r->a(in) a->b(door) } => { } }\n\
+                meet : active(1) { { q:robot x:room y:room p:person q->x(in) x->y(door) p->y(in) } => { } }\n";
+    let folder = Folder::new(&[("rules.aggl", text)]);
+    let (code, out, _) = rules(&folder, "explain", "rules.aggl", &["--rule", "meet"]);
+    assert_eq!(code, 0);
+    let expected = "watched with go, once where `in` changes: given r a, b from door of a";
+    assert!(out.contains(expected), "{out}");
+    let (_, out, _) = rules(&folder, "explain", "rules.aggl", &["--json"]);
+    let plans: Value = serde_json::from_str(&out).unwrap();
+    let set = json!({"label": "in", "with": ["meet"], "steps": ["given r a", "b from door of a"]});
+    let shared = plans[0]["shared"].as_array().unwrap();
+    assert!(shared.contains(&set), "{shared:?}");
+}
+
 /// The words of a table, line by line.
 fn words_of(table: &str) -> Vec<Vec<&str>> {
     table

@@ -49,6 +49,18 @@ impl Choices {
         }
     }
 
+    /// The same with other slots.
+    pub(crate) fn moved(&self, to: &impl Fn(usize) -> usize) -> Self {
+        let variable = |variable: &Variable| Variable {
+            domain: variable.domain.clone(),
+            near: variable.near.map(|link| link.moved(to)),
+        };
+        Self {
+            first: to(self.first),
+            variables: self.variables.iter().map(variable).collect(),
+        }
+    }
+
     /// The link that joins what a slot's node is to a node bound before, if only such nodes can
     /// matter.
     pub(crate) fn near(&self, slot: usize) -> Option<Link> {

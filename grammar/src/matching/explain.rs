@@ -121,7 +121,7 @@ impl Grammar {
     }
 
     /// A schema that has every name of the grammar, so that nothing is known to be missing.
-    fn schema_of_names(&self) -> Schema {
+    pub(super) fn schema_of_names(&self) -> Schema {
         let mut schema = Schema::open();
         let mut add = |node: Option<&str>, label: Option<&str>| {
             // A name that no schema can have is in no graph.
@@ -211,14 +211,14 @@ fn run(
     Ok((search.seen().collect(), given_up))
 }
 
-struct Words<'a> {
-    rule: &'a Rule,
-    query: &'a Query,
-    schema: &'a Schema,
+pub(super) struct Words<'a> {
+    pub(super) rule: &'a Rule,
+    pub(super) query: &'a Query,
+    pub(super) schema: &'a Schema,
 }
 
 impl Words<'_> {
-    fn source(&self, source: Source) -> String {
+    pub(super) fn source(&self, source: Source) -> String {
         let nodes: Vec<_> = self.rule.bound_nodes().collect();
         let edges = &self.rule.left.edges;
         match source {
@@ -238,7 +238,11 @@ impl Words<'_> {
         }
     }
 
-    fn checks(&self, links: impl Iterator<Item = usize>, tests: &[usize]) -> Vec<String> {
+    pub(super) fn checks(
+        &self,
+        links: impl Iterator<Item = usize>,
+        tests: &[usize],
+    ) -> Vec<String> {
         let condition = self.rule.precondition.as_ref();
         let conditions: Vec<&Condition> = condition.into_iter().flat_map(conjuncts).collect();
         let links = links.map(|link| self.rule.left.edges[link].to_string());

@@ -12,6 +12,9 @@ use super::program::{Link, Slot};
 use super::query::Query;
 use dsr::{EdgeKey, NodeId, ReadError, TypeId};
 
+/// A candidate counts once more for each time that it must be none of so many other nodes.
+const OTHERS: usize = 16;
+
 /// What a search fills.
 pub(crate) struct Slots<'s> {
     pub(crate) environment: &'s mut Environment,
@@ -63,6 +66,11 @@ impl<'h, H: Host> Frame<'h, '_, H> {
 
     /// What can be said of the slots that are bound from the start.
     pub(super) fn given_holds(&self, environment: &mut Environment) -> Result<bool, Interrupt> {
+        Ok(self.given_fits(environment)? && self.tests_hold(&self.plan.tests, environment)?)
+    }
+
+    /// The same, conditions left aside.
+    pub(super) fn given_fits(&self, environment: &Environment) -> Result<bool, Interrupt> {
         let Self { host, query, plan } = self;
         for (index, &slot) in plan.given.iter().enumerate() {
             let taken = environment[slot];
@@ -83,7 +91,7 @@ impl<'h, H: Host> Frame<'h, '_, H> {
                 return Ok(false);
             }
         }
-        self.tests_hold(&plan.tests, environment)
+        Ok(true)
     }
 
     /// Whether the links and conditions hold that are looked at after a step; `found` has the edges at
@@ -94,6 +102,18 @@ impl<'h, H: Host> Frame<'h, '_, H> {
         step: &Step,
         found: &[Option<H::Adjacency<'h>>],
         environment: &mut Environment,
+    ) -> Result<bool, Interrupt> {
+        Ok(self.links_hold(step, found, environment)?
+            && (step.tests.is_empty() || self.tests_hold(&step.tests, environment)?))
+    }
+
+    /// The same, conditions left aside.
+    #[inline]
+    pub(super) fn links_hold(
+        &self,
+        step: &Step,
+        found: &[Option<H::Adjacency<'h>>],
+        environment: &Environment,
     ) -> Result<bool, Interrupt> {
         for &(link, anchor) in &step.links {
             let link = &self.query.links[link];
@@ -116,10 +136,11 @@ impl<'h, H: Host> Frame<'h, '_, H> {
                 return Ok(false);
             }
         }
-        Ok(step.tests.is_empty() || self.tests_hold(&step.tests, environment)?)
+        Ok(true)
     }
 
-    fn tests_hold(
+    /// Whether conditions hold, by their indices.
+    pub(super) fn tests_hold(
         &self,
         tests: &[usize],
         environment: &mut Environment,
@@ -208,7 +229,9 @@ impl<'h, H: Host> Frame<'h, '_, H> {
             (.., Some(other)) => self.take(other, step, (rows, environment))?,
             _ => (0, None),
         };
-        environment.spend(read.0)?;
+        // In a wide pattern, holding a candidate against all others is what takes the time.
+        let others = step.others[0].len() / OTHERS;
+        environment.spend(read.0.saturating_mul(1 + others as u64))?;
         Ok(read)
     }
 

@@ -27,7 +27,7 @@ pub use explain::{SearchPlan, SearchStep};
 pub use matcher::Matcher;
 pub use matches::Matches;
 pub use obstacle::{End, Obstacle};
-pub use watch::{MatchDelta, RuleMatch, Watch};
+pub use watch::{MatchDelta, RuleMatch, SharedSteps, Watch};
 
 pub(crate) use ahead::Ahead;
 pub(crate) use choice::Choices;

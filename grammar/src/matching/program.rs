@@ -222,7 +222,36 @@ impl<'a> Compiler<'a> {
     }
 }
 
+impl Link {
+    /// The same with other slots.
+    pub(crate) fn moved(self, to: &impl Fn(usize) -> usize) -> Self {
+        Self {
+            from: to(self.from),
+            to: to(self.to),
+            ..self
+        }
+    }
+}
+
 impl Test {
+    /// The same with other slots.
+    pub(crate) fn moved(&self, to: &impl Fn(usize) -> usize) -> Self {
+        let inner = |test: &Self| Box::new(test.moved(to));
+        let all = |tests: &[Self]| tests.iter().map(|test| test.moved(to)).collect();
+        match self {
+            Self::Link(link) => Self::Link(link.moved(to)),
+            Self::Same(first, second) => Self::Same(to(*first), to(*second)),
+            Self::Compare(operator, left, right) => {
+                Self::Compare(*operator, left.moved(to), right.moved(to))
+            }
+            Self::Not(test) => Self::Not(inner(test)),
+            Self::All(tests) => Self::All(all(tests)),
+            Self::Any(tests) => Self::Any(all(tests)),
+            Self::Exists(choices, test) => Self::Exists(choices.moved(to), inner(test)),
+            Self::Forall(choices, test) => Self::Forall(choices.moved(to), inner(test)),
+        }
+    }
+
     /// Whether its outcome depends on the slot.
     pub(crate) fn reads(&self, slot: usize) -> bool {
         match self {
@@ -237,6 +266,24 @@ impl Test {
 }
 
 impl Term {
+    fn moved(&self, to: &impl Fn(usize) -> usize) -> Self {
+        match self {
+            Self::Constant(value) => Self::Constant(value.clone()),
+            Self::NodeAttribute { node, attribute } => Self::NodeAttribute {
+                node: to(*node),
+                attribute: *attribute,
+            },
+            Self::EdgeAttribute { link, attribute } => Self::EdgeAttribute {
+                link: link.moved(to),
+                attribute: *attribute,
+            },
+            Self::Arithmetic(operator, operands) => {
+                let operands = operands.iter().map(|operand| operand.moved(to));
+                Self::Arithmetic(*operator, operands.collect())
+            }
+        }
+    }
+
     fn reads(&self, slot: usize) -> bool {
         match self {
             Self::Constant(_) => false,

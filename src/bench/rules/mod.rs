@@ -3,11 +3,12 @@
 
 mod indoor;
 mod peers;
+mod watching;
 
 use super::quantity::Quantity;
 use crate::Failure;
 use dsr::{Graph, NodeId, Snapshot, Time, Transaction};
-use grammar::{Binding, Grammar, Matcher, Rewriter, Watch, WorkingGraph, parse_grammar};
+use grammar::{Binding, Grammar, Matcher, Rewriter, WorkingGraph, parse_grammar};
 use indoor::Indoor;
 use peers::Peers;
 use std::path::PathBuf;
@@ -41,13 +42,18 @@ fn middle(times: &mut [f64], share: f64) -> f64 {
         .unwrap_or(0.0)
 }
 
-/// All quantities.
-pub(crate) fn rules() -> Result<Vec<Quantity>, Failure> {
-    let (grammar, diagnostics) = parse_grammar(RULES, "patterns.aggl");
+/// Rules that are part of the program.
+fn read(text: &str) -> Result<Arc<Grammar>, Failure> {
+    let (grammar, diagnostics) = parse_grammar(text, "patterns.aggl");
     if grammar::has_errors(&diagnostics) {
         return Err(Failure::Internal(grammar::Defects { diagnostics }.into()));
     }
-    let grammar = Arc::new(grammar);
+    Ok(Arc::new(grammar))
+}
+
+/// All quantities.
+pub(crate) fn rules() -> Result<Vec<Quantity>, Failure> {
+    let grammar = read(RULES)?;
     let peers = Peers::find()?;
     let folder = Folder::new()?;
     let mut quantities = Vec::new();
@@ -63,7 +69,8 @@ pub(crate) fn rules() -> Result<Vec<Quantity>, Failure> {
             &mut quantities,
         )?;
         rewriting(&grammar, &mut graph, &world, name, &mut quantities)?;
-        changing(&grammar, &mut graph, &world, name, &mut quantities)?;
+        watching::changing(&grammar, &mut graph, &world, name, &mut quantities)?;
+        watching::related(&mut graph, &world, name, &mut quantities)?;
     }
     parsing(&mut quantities)?;
     Ok(quantities)
@@ -197,82 +204,6 @@ fn rewriting(
     Ok(())
 }
 
-/// What it takes a watch over all rules to take in that a robot left or entered a room.
-fn changing(
-    grammar: &Arc<Grammar>,
-    graph: &mut Graph,
-    world: &Indoor,
-    size: &str,
-    quantities: &mut Vec<Quantity>,
-) -> Result<(), Failure> {
-    let names: Vec<&str> = grammar
-        .rules
-        .iter()
-        .map(|rule| rule.name.as_str())
-        .collect();
-    let watch = Watch::new(Arc::clone(grammar), &names, &graph.snapshot());
-    let mut watch = watch.map_err(Failure::internal)?;
-    let rooms = world.nodes.iter().filter(|kind| **kind == "room").count();
-    let id = |index: usize| NodeId(index as u64 + 1);
-    let start = graph.snapshot();
-    let within = start.schema().find_label("in");
-    let mut places = Vec::new();
-    for (robot, _) in world
-        .nodes
-        .iter()
-        .enumerate()
-        .filter(|(_, kind)| **kind == "robot")
-    {
-        let node = start.find_node(id(robot)).map_err(Failure::internal)?;
-        let rooms = node
-            .zip(within)
-            .map(|(node, within)| node.targets_of(within));
-        for room in rooms.into_iter().flatten() {
-            places.push((robot, room.map_err(Failure::internal)?.0 as usize - 1));
-        }
-    }
-    let mut times = Vec::new();
-    for turn in 0..4000 {
-        let robot = turn / 2 % places.len();
-        let (node, room) = places[robot];
-        let mut transaction = Transaction::new();
-        if turn % 2 == 0 {
-            transaction.delete_edge(id(node), "in", id(room));
-        } else {
-            places[robot].1 = (room + 1) % rooms;
-            transaction.create_edge(id(node), "in", id(places[robot].1));
-        }
-        let committed = graph.commit(&transaction, "bench", Time::default());
-        let (_, change) = committed.map_err(Failure::internal)?;
-        let snapshot = graph.snapshot();
-        let started = Instant::now();
-        let delta = watch
-            .update(&change, &snapshot)
-            .map_err(Failure::internal)?;
-        times.push(started.elapsed().as_secs_f64() * 1e6);
-        drop(delta);
-    }
-    let snapshot = graph.snapshot();
-    for rule in &grammar.rules {
-        let fresh = grammar
-            .matches(&snapshot, rule, &Binding::new())
-            .map_err(Failure::internal)?;
-        let fresh = fresh.count_all().map_err(Failure::internal)?;
-        if fresh != watch.count(&rule.name) as u64 {
-            let told = format!(
-                "the watch has other matches of {} than there are",
-                rule.name
-            );
-            return Err(Failure::internal(told));
-        }
-    }
-    for (what, share) in [("delta", 0.5), ("delta_99_percent", 0.99)] {
-        let name = format!("{what}_{size}");
-        quantities.push(Quantity::new(name, middle(&mut times, share), "us"));
-    }
-    Ok(())
-}
-
 /// Megabytes of rules a second.
 fn parsing(quantities: &mut Vec<Quantity>) -> Result<(), Failure> {
     let (head, rules) = RULES.rsplit_once("===").unwrap_or_default();
@@ -285,13 +216,7 @@ fn parsing(quantities: &mut Vec<Quantity>) -> Result<(), Failure> {
         }
         text.push_str(&renamed);
     }
-    let time = median(|| {
-        let (grammar, diagnostics) = parse_grammar(&text, "many.aggl");
-        if grammar::has_errors(&diagnostics) {
-            return Err(Failure::Internal(grammar::Defects { diagnostics }.into()));
-        }
-        Ok(grammar)
-    })?;
+    let time = median(|| read(&text))?;
     quantities.push(Quantity::new(
         "parse".to_owned(),
         text.len() as f64 / time,

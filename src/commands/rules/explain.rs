@@ -4,7 +4,7 @@ use super::{find_rule, load, unmatched};
 use crate::commands::graph::read_graph;
 use crate::commands::output::{print, print_json};
 use crate::{Answer, Failure};
-use grammar::{Binding, Rule, SearchPlan, SearchStep, WHOLE_LIMIT};
+use grammar::{Binding, Rule, SearchPlan, SearchStep, SharedSteps, WHOLE_LIMIT};
 use serde_json::{Value as Json, json};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -27,19 +27,58 @@ pub(super) fn explain(
         .map(|rule| grammar.search_plan(snapshot.as_ref(), rule, &Binding::new()))
         .collect::<Result<Vec<_>, _>>()
         .map_err(unmatched)?;
+    let shared = grammar.shared_steps(snapshot.as_ref()).map_err(unmatched)?;
+    let of = |plan: &SearchPlan| -> Vec<&SharedSteps> {
+        let shared = shared.iter();
+        shared
+            .filter(|shared| shared.rules.contains(&plan.rule))
+            .collect()
+    };
     if as_json {
-        let mut rows: Vec<Json> = plans.iter().map(plan_json).collect();
+        let rows = plans.iter().map(|plan| plan_json(plan, &of(plan)));
+        let mut rows: Vec<Json> = rows.collect();
         // Asked for one rule, the answer is of one rule.
         let one = rule.is_some().then(|| rows.pop()).flatten();
         print_json(&one.unwrap_or(Json::Array(rows)))?;
         return Ok(Answer::Yes);
     }
-    let tables: Vec<String> = plans.iter().map(table).collect();
+    let tables = plans
+        .iter()
+        .map(|plan| table(plan) + &sharing(plan, &of(plan)));
+    let tables: Vec<String> = tables.collect();
     print(&tables.join("\n"))?;
     Ok(Answer::Yes)
 }
 
-fn plan_json(plan: &SearchPlan) -> Json {
+/// So many sets of rules that share steps with a rule are shown.
+const SHOWN: usize = 5;
+
+/// The other rules of a set.
+fn others<'a>(plan: &SearchPlan, shared: &'a SharedSteps) -> Vec<&'a str> {
+    let rules = shared.rules.iter().map(String::as_str);
+    rules.filter(|rule| *rule != plan.rule).collect()
+}
+
+/// What a watch of all rules does once for this one and others, in words.
+fn sharing(plan: &SearchPlan, shared: &[&SharedSteps]) -> String {
+    let mut text = String::new();
+    for set in shared.iter().take(SHOWN) {
+        let (label, steps) = (&set.label, set.steps.join(", "));
+        let others = others(plan, set).join(" ");
+        // Writing to a string does not fail.
+        let _ = writeln!(
+            text,
+            "    watched with {others}, once where `{label}` changes: {steps}"
+        );
+    }
+    if shared.len() > SHOWN {
+        let _ = writeln!(text, "    and {} more such sets", shared.len() - SHOWN);
+    }
+    text
+}
+
+fn plan_json(plan: &SearchPlan, shared: &[&SharedSteps]) -> Json {
+    let set = |set: &&SharedSteps| json!({"label": set.label, "with": others(plan, set), "steps": set.steps});
     let step = |step: &SearchStep| {
         json!({
             "binds": step.binds,
@@ -58,6 +97,7 @@ fn plan_json(plan: &SearchPlan) -> Json {
         "given_up": plan.given_up,
         "checks": plan.checks,
         "steps": plan.steps.iter().map(step).collect::<Vec<_>>(),
+        "shared": shared.iter().map(set).collect::<Vec<_>>(),
     })
 }
 

@@ -3,23 +3,25 @@
 //! Guarantee: after every change up to a version was taken in, the matches are those that a fresh
 //! search in that version finds; the cost of that follows what the change touches.
 
+mod explain;
+mod make;
+mod pattern;
 mod set;
+mod shared;
 mod trigger;
 
 use super::MatchError;
-use super::environment::{Environment, Interrupt, SEARCH_LIMIT};
-use super::frame::{Frame, Slots};
-use super::plan::Plan;
+use super::environment::Interrupt;
 use super::planned::Planned;
-use super::program::Slot;
-use super::query::Problem;
-use super::search::Search;
 use crate::{Binding, Grammar, Name, Rule};
 use dsr::{
     Change, EdgeChange, Epoch, LabelId, NodeChange, NodeId, ReadError, Schema, Snapshot, Touch,
     TypeId, Version,
 };
+pub use explain::SharedSteps;
+use pattern::Pattern;
 use set::{MatchSet, Row, Seed};
+use shared::Shared;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use trigger::{Anchor, Can, EdgeTrigger, NodeTrigger, Seeds, Triggers, When};
@@ -27,7 +29,8 @@ use trigger::{Anchor, Can, EdgeTrigger, NodeTrigger, Seeds, Triggers, When};
 /// The matches of some rules, kept up to date from the changes of a graph.
 ///
 /// Rules whose left sides and conditions are the same but for the names of variables share one set
-/// of matches, and what a change touches is looked up once for all rules.
+/// of matches, and what a change touches is looked up once for all rules. Where the searches of several
+/// rules from a changed link or node begin with the same steps, these are taken once for all of them.
 ///
 /// A change costs as much as the partial matches that bind what it touches. There is one
 /// exception: where a condition quantifies over nodes that no link joins to the match (`(exists
@@ -64,18 +67,12 @@ pub struct Watch {
     patterns: Vec<Pattern>,
     edges: BTreeMap<LabelId, Vec<(usize, EdgeTrigger)>>,
     nodes: Vec<(usize, NodeTrigger)>,
+    /// Searches that were made together, by patterns and their given slots.
+    shared: BTreeMap<Vec<(usize, Vec<usize>)>, Shared>,
     epoch: Option<Epoch>,
     version: Version,
     /// A change was taken in halfway: an error came in between.
     torn: bool,
-}
-
-#[derive(Debug)]
-struct Pattern {
-    planned: Planned,
-    /// How many nodes and edges have changed since the plans were last compared with the graph.
-    changes: u64,
-    set: MatchSet,
 }
 
 /// A match of a rule.
@@ -99,6 +96,9 @@ pub struct MatchDelta {
 /// What a change can do to partial matches.
 type Touched = BTreeMap<(usize, Seed), Can>;
 
+/// By the nodes that are given, the patterns in which to look for matches with them, and their slots there.
+type Makes = BTreeMap<Vec<NodeId>, Vec<(usize, Vec<usize>)>>;
+
 /// By pattern, new and gone matches.
 type Rows = BTreeMap<usize, [BTreeSet<Row>; 2]>;
 
@@ -119,6 +119,7 @@ impl Watch {
             patterns: Vec::new(),
             edges: BTreeMap::new(),
             nodes: Vec::new(),
+            shared: BTreeMap::new(),
             epoch: None,
             version: snapshot.version(),
             torn: false,
@@ -137,6 +138,7 @@ impl Watch {
         self.patterns.clear();
         self.edges.clear();
         self.nodes.clear();
+        self.shared.clear();
         self.rules.clear();
         for &name in rules {
             let rule = self.grammar.find_rule(name)?;
@@ -307,12 +309,13 @@ impl Watch {
         for index in &afresh {
             touched.insert((*index, Seed::new()), Can::EITHER);
         }
+        let mut makes: Makes = Makes::new();
         for ((index, seed), can) in touched {
             if afresh.contains(&index) && !seed.is_empty() {
                 continue;
             }
             let pattern = &mut self.patterns[index];
-            let [added, removed] = rows.entry(index).or_default();
+            let [_, removed] = rows.entry(index).or_default();
             if can.break_some || can.break_all {
                 for row in pattern.set.extending(&seed) {
                     if can.break_all || !pattern.holds(snapshot, &row)? {
@@ -322,12 +325,14 @@ impl Watch {
                 }
             }
             if can.make {
-                for row in pattern.search(snapshot, &seed)? {
-                    if pattern.set.insert(&row) {
-                        added.insert(row);
-                    }
-                }
+                let mut seed = seed;
+                seed.sort_unstable_by_key(|&(_, node)| node);
+                let (slots, nodes) = seed.into_iter().unzip();
+                makes.entry(nodes).or_default().push((index, slots));
             }
+        }
+        for (nodes, wanted) in makes {
+            self.make(snapshot, &nodes, wanted, &mut rows)?;
         }
         Ok(rows)
     }
@@ -428,55 +433,6 @@ fn note(index: usize, seeds: Seeds, can: Can, touched: &mut Touched, afresh: &mu
     };
     for seed in seeds {
         touched.entry((index, seed)).or_default().add(can);
-    }
-}
-
-impl Pattern {
-    fn at(&self, seed: impl Iterator<Item = (usize, NodeId)>) -> Problem {
-        let query = self.planned.query();
-        let mut environment = Environment::new(query.slots, SEARCH_LIMIT);
-        for (slot, node) in seed {
-            environment[slot] = Slot::Node(node);
-        }
-        Problem {
-            query: Arc::clone(query),
-            environment,
-        }
-    }
-
-    /// The plan for a search with these slots given.
-    fn plan(&mut self, snapshot: &Snapshot, given: &[usize]) -> Result<Arc<Plan>, ReadError> {
-        self.planned.plan_after(&mut self.changes, snapshot, given)
-    }
-
-    /// The matches that bind these slots so.
-    fn search(&mut self, snapshot: &Snapshot, seed: &Seed) -> Result<Vec<Row>, Interrupt> {
-        let problem = self.at(seed.iter().copied());
-        let given: Vec<usize> = seed.iter().map(|(slot, _)| *slot).collect();
-        let plan = self.plan(snapshot, &given)?;
-        let mut search = Search::new(snapshot, problem, plan);
-        let mut rows = Vec::new();
-        while search.advance()? {
-            rows.push(search.nodes().collect());
-        }
-        Ok(rows)
-    }
-
-    /// Whether a match still holds.
-    fn holds(&mut self, snapshot: &Snapshot, row: &Row) -> Result<bool, Interrupt> {
-        let mut problem = self.at(row.iter().copied().enumerate());
-        let given: Vec<usize> = (0..row.len()).collect();
-        let plan = self.plan(snapshot, &given)?;
-        let frame = Frame {
-            host: snapshot,
-            query: &problem.query,
-            plan: &plan,
-        };
-        frame.first(&mut Slots {
-            environment: &mut problem.environment,
-            // All slots are given: there is no step.
-            ahead: &mut [],
-        })
     }
 }
 

@@ -5,7 +5,7 @@ use crate::testing::oracle::{Model, NODE_TYPES, TYPES};
 use crate::testing::random::FEW;
 use crate::testing::repair::repaired;
 use crate::testing::{graph, read, rule};
-use crate::{has_errors, parse_grammar};
+use crate::{PatternEdge, PatternNode, has_errors, parse_grammar};
 use dsr::{EdgeRef, Graph, NodeRef, Operation, Owner, Time, Transaction, Value};
 use proptest::prelude::*;
 
@@ -128,6 +128,35 @@ fn of_rule(matches: &[RuleMatch], rule: &str) -> BTreeSet<Binding> {
     of_rule.map(|found| found.binding.clone()).collect()
 }
 
+/// A rule with one more node and a link to it or from it: it begins as the other does.
+fn with_more(
+    mut rule: Rule,
+    (kind, label, [out, negated, first]): &(usize, usize, [bool; 3]),
+) -> Rule {
+    let node = PatternNode::new("more", NODE_TYPES[*kind]);
+    let nodes = &mut rule.left.nodes;
+    let other = if *first { nodes.first() } else { nodes.last() };
+    let other = other.map_or_else(|| Name::from("more"), |node| node.variable.clone());
+    let (from, to) = if *out {
+        (other, Name::from("more"))
+    } else {
+        (Name::from("more"), other)
+    };
+    nodes.push(node.clone());
+    if rule.precondition.is_some() && *negated {
+        // Begins as the other does but for its condition.
+        rule.precondition = None;
+    }
+    rule.right.nodes.push(node);
+    rule.left.edges.push(PatternEdge {
+        from,
+        label: Name::from(["on", "by"][*label]),
+        to,
+        negated: *negated,
+    });
+    rule
+}
+
 proptest! {
     #![proptest_config(crate::testing::cases(600))]
 
@@ -135,9 +164,12 @@ proptest! {
     fn a_watch_has_what_a_fresh_search_finds(
         model in Model::strategy(),
         rules in prop::collection::vec(FEW.rule(), 1..4),
+        related in prop::collection::vec((0..5_usize, 0..2_usize, any::<[bool; 3]>()), 0..4),
         groups in prop::collection::vec(prop::collection::vec(act(), 1..4), 1..12),
     ) {
         let (mut grammar, _) = parse_grammar(TYPES, "types.aggl");
+        let more = related.iter().map(|more| with_more(rules[0].clone(), more));
+        let rules = more.chain(rules.clone()).collect::<Vec<_>>();
         for (index, rule) in rules.into_iter().enumerate() {
             let mut rule = repaired(rule);
             rule.name = format!("r{index}").as_str().into();
@@ -221,6 +253,77 @@ fn rules_that_differ_in_names_only_share_their_matches() {
         .map(|found| format!("{} {}", found.rule, found.binding))
         .collect();
     assert_eq!(told, ["up a = 1, b = 2", "down c = 1, d = 2"]);
+}
+
+#[test]
+fn searches_that_begin_alike_are_made_together() {
+    let grammar = Arc::new(read(
+        "name=test\n===\n\
+         go : active(1) { { r:bot a:room b:room r->a(in) a->b(door) } => { r:bot a:room b:room } }\n\
+         bring : active(1) { { c:cup y:room x:room q:bot q->x(in) x->y(door) c->y(in) } => { } }\n\
+         meet : active(1) { { r:bot a:room b:room p:man r->a(in) a->b(door) p->b(in) } => { }\n\
+         precondition { (not (exists o:man (likes p o))) } }\n\
+         rest : active(1) { { r:bot a:room t:cup r->a(in) t->r(on) } => { } }\n",
+    ));
+    let names = ["go", "bring", "meet", "rest"];
+    let nodes = [
+        ("bot", "r"),
+        ("room", "a"),
+        ("room", "b"),
+        ("room", "c"),
+        ("cup", "cup"),
+        ("man", "p"),
+        ("man", "q"),
+    ];
+    let links = [
+        ("a", "door", "b"),
+        ("a", "door", "c"),
+        ("cup", "in", "b"),
+        ("p", "in", "c"),
+        ("q", "in", "b"),
+        ("q", "likes", "p"),
+    ];
+    let mut world = graph(&nodes, &links);
+    let told = grammar.shared_steps(Some(&world.snapshot())).unwrap();
+    let told = told.iter().map(|shared| {
+        let (label, rules) = (&shared.label, shared.rules.join(" "));
+        format!("{label} {rules}: {}", shared.steps.join(", "))
+    });
+    assert_eq!(
+        told.collect::<Vec<_>>(),
+        [
+            "door go bring meet: given a b, r from in to a",
+            "in go bring meet: given r a, b from door of a"
+        ]
+    );
+    let mut watch = Watch::new(grammar, &names, &world.snapshot()).unwrap();
+    let change = link(&mut world, "r", "in", "a");
+    let delta = watch.update(&change, &world.snapshot()).unwrap();
+    let told: Vec<String> = delta
+        .added
+        .iter()
+        .map(|found| format!("{} {}", found.rule, found.binding))
+        .collect();
+    assert_eq!(
+        told,
+        [
+            "go r = 1, a = 2, b = 3",
+            "go r = 1, a = 2, b = 4",
+            "bring c = 5, y = 3, x = 2, q = 1",
+            "meet r = 1, a = 2, b = 4, p = 6"
+        ]
+    );
+    let [shared] = &watch.shared.values().collect::<Vec<_>>()[..] else {
+        panic!("{:?}", watch.shared)
+    };
+    let by_step = shared
+        .branches
+        .iter()
+        .filter(|branch| matches!(branch.part, shared::Part::Step(_)));
+    let by_step: Vec<usize> = by_step.map(|branch| branch.through.len()).collect();
+    // The door is gone through once for three rules, and then each looks for its own.
+    assert_eq!(by_step, [3, 1, 1, 1]);
+    assert_eq!(shared.alone.len(), 1);
 }
 
 #[test]
