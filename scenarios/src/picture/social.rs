@@ -101,8 +101,13 @@ fn map(
     show: Show,
 ) -> Group {
     let mut labels = Labels::new(view);
+    // On a grid of costs, a wall is as wide as what it blocks.
+    let wall = match show {
+        Show::Costs(_) => WALL + view.px(situation.scene.robot_radius),
+        Show::Density => WALL,
+    };
     for [from, to] in &situation.scene.walls {
-        labels.shun_line(view.page(*from), view.page(*to), WALL);
+        labels.shun_line(view.page(*from), view.page(*to), wall);
     }
     let floor = if situation.rooms.is_empty() {
         "#ffffff"
