@@ -1,7 +1,7 @@
 //! `cortex run` as its users meet it: whole runs of the shipped scenarios, and what happens when
 //! something goes wrong in the middle of one.
 
-use crate::support::{Program, Run};
+use crate::support::{Program, Run, within};
 use dsr::{Session, Time, Transaction};
 use serde_json::Value;
 use std::fmt::Write as _;
@@ -234,6 +234,28 @@ fn a_store_that_is_killed_again_and_again_loses_nothing() {
     let (_, report) = report(folder.path());
     assert_eq!(report["success"], true);
     assert_eq!(report["agents"][0]["restarts"], 3);
+}
+
+#[test]
+fn while_social_mapping_hangs_the_robot_says_that_its_map_is_lost() {
+    let mut run = Run::new("hangs", &[CARE_CENTRE, "--speed", "4", "--no-baseline"]).start();
+    run.until("mission invite is running");
+    let name = run.instance_name().to_owned();
+    let becomes = |state: &str| {
+        let asked = within(PATIENCE, || {
+            let got = Program::run(&["graph", "get", "robot.map_state", "--instance", &name]);
+            (got.stdout == format!("{state:?}\n").as_bytes()).then_some(())
+        });
+        assert!(asked.is_some(), "it never becomes {state}");
+    };
+    becomes("current");
+    run.stop("social_mapping");
+    becomes("lost");
+    run.resume("social_mapping");
+    becomes("current");
+    run.interrupt();
+    assert_eq!(run.exit_code(), 1);
+    run.assert_nothing_is_left();
 }
 
 #[test]

@@ -129,9 +129,23 @@ impl Started {
             .collect()
     }
 
-    /// Kills the process of that name with signal 9; one that is just being started again is waited
-    /// for.
+    /// Kills the process of that name with signal 9.
     pub(crate) fn kill(&self, name: &str) {
+        self.send(Signal::KILL, name);
+    }
+
+    /// Stops the process of that name where it is.
+    pub(crate) fn stop(&self, name: &str) {
+        self.send(Signal::STOP, name);
+    }
+
+    /// Lets it go on.
+    pub(crate) fn resume(&self, name: &str) {
+        self.send(Signal::CONT, name);
+    }
+
+    /// One that is just being started again is waited for.
+    fn send(&self, what: Signal, name: &str) {
         let find = || {
             self.processes().into_iter().find(|(_, line)| {
                 let words: Vec<&str> = line.split(' ').collect();
@@ -141,7 +155,7 @@ impl Started {
         // Each look takes a millisecond or more.
         for _ in 0..10_000 {
             if let Some((id, _)) = find() {
-                return signal(id, Signal::KILL);
+                return signal(id, what);
             }
             std::thread::yield_now();
         }
