@@ -105,7 +105,7 @@ impl Grammar {
     ///
     /// The graph is the smallest overlay of the two left sides, completed by what preconditions ask for. At most
     /// [`OVERLAY_LIMIT`] ways to lay one over the other are looked at. No more than [`CONFLICT_LIMIT`] are given. All
-    /// together may take no more than `effort`, of which each pair of rules has an equal share at first; what some
+    /// together may take no more than `effort`, of which each pair of rules has an equal share at first (at least 5,000,000 as long as there is any); what some
     /// leave is for the others. With [`EFFORT_LIMIT`] that is at most some ten seconds. Of which pairs it was not
     /// found out is told.
     pub fn conflicts(&self, effort: u64) -> Conflicts {

@@ -26,6 +26,8 @@ pub const CONFLICT_LIMIT: usize = 1_000;
 pub const EFFORT_LIMIT: u64 = 10_000_000_000;
 /// Rules with more nodes than this are not compared.
 const NODE_LIMIT: usize = 48;
+/// Two rules get at least so much of it, as long as there is any: with less, hardly any two are decided.
+const SHARE: u64 = 5_000_000;
 /// So many pairs of rules are looked into.
 const PAIR_LIMIT: usize = 1_000_000;
 /// So many graphs to be tried are kept for two rules.
@@ -159,7 +161,7 @@ pub(super) fn conflicts(grammar: &Grammar, effort: u64) -> Conflicts {
                 continue;
             }
             let (all, rest) = (effort.left, (count - place) as u64);
-            effort.left = all / rest;
+            effort.left = (all / rest).max(SHARE).min(all);
             let share = effort.left;
             let result = pairs[pair].smallest(&kinds, &mut effort);
             effort.left += all - share;
