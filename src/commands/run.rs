@@ -2,7 +2,7 @@
 
 use super::output;
 use crate::cli::Run as Arguments;
-use crate::conduct::{Recording, Settings, conduct};
+use crate::conduct::{ConductError, Recording, Settings, conduct};
 use crate::progress::Progress;
 use crate::{Answer, Failure};
 use executive::{Mission, MissionStep, StepStatus};
@@ -116,7 +116,10 @@ impl Plan<'_> {
         };
         let mut progress = Progress::new(&title, arguments.json);
         let recording = conduct(&settings, self.interrupted, &mut progress);
-        let recording = recording.map_err(Failure::internal)?;
+        let recording = recording.map_err(|error| match error {
+            ConductError::Hold(_) => Failure::input(error),
+            error => Failure::internal(error),
+        })?;
         if recording.is_none() {
             progress.say("interrupted: every process has ended, nothing is reported");
         }

@@ -145,7 +145,8 @@ fn go_by_flags(store: &mut Store, arguments: &Arguments) -> Result<(), Failure> 
 fn no_way_on(error: impl std::fmt::Display) -> Failure {
     Failure::input_with_help(
         error,
-        "`cortex store --fresh` begins without what the killed store left in memory",
+        "`cortex store --fresh` begins without what the killed store left in memory; its own scenario, \
+         without --state or with another folder, goes on with that",
     )
 }
 

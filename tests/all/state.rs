@@ -1,7 +1,7 @@
 //! The graph on disk, when everything is killed: what was called durable is there again, whole.
 
 use crate::support::{Process, Program, TestInstance, within};
-use dsr::{Session, Time, Transaction, Value, Version};
+use dsr::{Durability, Schema, Session, State, Store, Time, Transaction, Value, Version};
 use std::collections::BTreeMap;
 use std::process::{Child, Stdio};
 use std::sync::mpsc;
@@ -401,5 +401,35 @@ fn an_instance_has_one_store_and_goes_on_with_its_own_scenario_and_its_own_state
     let robot = snapshot.find_node_by_name("robot").unwrap().unwrap();
     // What the scenario's files say is laid over what the folder has.
     assert!(robot.value("max_speed").unwrap().is_some());
+    drop((store, session));
+}
+
+#[test]
+fn stores_that_end_before_they_show_what_they_took_over_lose_nothing() {
+    let instance = TestInstance::new("unshown");
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("state");
+    let keep = ["--state", path.to_str().unwrap(), "--durable"];
+    let store = ByHand::start(&instance, &keep);
+    let mut session = Session::attach(&instance.0, "cortex-graph", PATIENCE).unwrap();
+    let mut transaction = Transaction::new();
+    transaction.set("robot", "max_speed", 0.101);
+    let commit = session.commit(&transaction, Time::default()).unwrap();
+    assert!(commit.durable);
+    drop((store, session));
+    for _ in 0..3 {
+        let state = State::open(&path).unwrap();
+        let mut store = Store::open(&instance.0, Schema::open()).unwrap();
+        let left = store.orphaned(Some(&state)).unwrap().unwrap();
+        assert_eq!(left.version(), commit.version);
+        store.take_over(&left).unwrap();
+        store.keep(state, PATIENCE, Durability::OnDisk).unwrap();
+    }
+    let store = ByHand::start(&instance, &keep);
+    let mut session = Session::attach(&instance.0, "cortex-graph", PATIENCE).unwrap();
+    let snapshot = session.snapshot().unwrap();
+    assert_eq!(snapshot.version(), commit.version);
+    let robot = snapshot.find_node_by_name("robot").unwrap().unwrap();
+    assert_eq!(robot.value("max_speed").unwrap(), Some(Value::F64(0.101)));
     drop((store, session));
 }

@@ -227,11 +227,6 @@ impl State {
         }))
     }
 
-    /// Whether a graph was ever written to the folder.
-    pub(crate) fn holds_graph(&self) -> Result<bool, StateError> {
-        Ok(self.find_about::<Frame>(about::FRAME)?.is_some())
-    }
-
     /// Which life of the store wrote the folder last; `None` where nothing was written to it yet, or by an
     /// older version of this program.
     pub(crate) fn life(&self) -> Result<Option<Life>, StateError> {

@@ -23,7 +23,7 @@ pub struct Orphaned {
 impl Orphaned {
     /// Its last version.
     pub fn version(&self) -> Version {
-        self.last.1
+        self.image.version()
     }
 
     /// The graph.
@@ -69,7 +69,8 @@ impl Store {
     }
 
     /// The graph of the store before this one, if that was killed and its memory is still there: its last
-    /// committed version. `None` also where the state folder has all of it.
+    /// committed version. It comes from the state folder where a store had taken it over into that and ended
+    /// before it showed itself.
     ///
     /// # Errors
     /// [`StoreError::Orphan`] where it cannot be read; [`StoreError::Diverged`] where the folder has something
@@ -80,12 +81,12 @@ impl Store {
         };
         let last = (orphan.epoch(), orphan.version());
         if let Some(state) = state
-            && state.holds_graph()?
+            && let Some(image) = state.load()?
         {
             match state.life()? {
                 // The memory is never behind the disk.
                 Some(life) if life.epoch == last.0 => {}
-                Some(life) if life.from == Some(last) => return Ok(None),
+                Some(life) if life.from == Some(last) => return Ok(Some(Orphaned { image, last })),
                 _ => return Err(StoreError::Diverged { version: last.1 }),
             }
         }
