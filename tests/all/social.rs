@@ -234,6 +234,24 @@ fn figures_and_what_is_known_of_people_show_in_the_picture() {
 }
 
 #[test]
+fn a_map_goes_as_far_as_the_figures_of_the_flags() {
+    let folder = TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let alone = json!({"frames": [{"t": 0, "people": [person(1, 0.0, 0.0, 0.0)]}]});
+    fs::write(path("alone.json"), alone.to_string()).unwrap();
+    fs::write(path("printed.toml"), "[social]\nproxemics = \"printed\"\n").unwrap();
+    let settings = path("printed.toml");
+    let maps = [["--proxemics", "printed"], ["--settings", &settings]].map(|flags| {
+        let (file, out) = (path("alone.json"), path("map.yaml"));
+        let map = ["social", "map", &file, "--ros-mode", "raw", "--out", &out];
+        let (code, _, error) = cortex(&[&map[..], &flags].concat());
+        assert_eq!(code, 0, "{error}");
+        fs::read(path("map.pgm")).unwrap()
+    });
+    assert_eq!(maps[0], maps[1]);
+}
+
+#[test]
 fn layers_of_the_map_are_drawn_one_by_one() {
     let folder = tempfile::tempdir().unwrap();
     let file = recording(&folder, false);

@@ -264,6 +264,7 @@ fn whole(table: &Table<'_>, text: &str, read: Read<'_>) -> Scenario {
     let rules = file(table, "rules", "rules.aggl", read);
     let tracks = tracks(table);
     let social = social(table);
+    check_names(table, &names);
     let human_observer = human_observer(table);
     Scenario {
         name,
@@ -422,7 +423,26 @@ fn social(scenario: &Table<'_>) -> SocialConfig {
     for problem in config.problems() {
         let message = format!("{} {}", problem.field, problem.requirement);
         let kind = ProblemKind::Figure { message };
-        scenario.problems.add(kind, scenario.span_of("social"));
+        let place = scenario.span_along(&format!("social.{}", problem.field));
+        scenario.problems.add(kind, place);
     }
     config
+}
+
+/// Notes the names in `[social]` that nothing of the scenario has.
+fn check_names(scenario: &Table<'_>, names: &Names<'_>) {
+    let named = [
+        ("usage_of", "object", Kind::Object),
+        ("activity_in", "room", Kind::Room),
+    ];
+    for (key, what, kind) in named {
+        for name in scenario.keys_of("social", key) {
+            if !names.is(&name.value, kind) {
+                names.unknown(scenario.problems, what, &[kind], &name);
+            }
+        }
+    }
+    for class in scenario.keys_of("social", "spaces") {
+        space::check_class(scenario.problems, &class);
+    }
 }

@@ -191,6 +191,32 @@ impl<'a> Table<'a> {
             .map_or_else(|| self.span.clone(), Spanned::span)
     }
 
+    /// Where the value stands to which the keys of a path lead, or as far as they lead.
+    pub(super) fn span_along(&self, path: &str) -> Range<usize> {
+        let (mut table, mut span) = (Some(self.entries), self.span.clone());
+        for key in path.split('.') {
+            let Some(value) = table.and_then(|table| table.get(key)) else {
+                break;
+            };
+            span = value.span();
+            table = value.get_ref().as_table();
+        }
+        span
+    }
+
+    /// The keys of the table to which two keys lead, none where there is none.
+    pub(super) fn keys_of(&self, table: &str, key: &str) -> Vec<Located<String>> {
+        let outer = self.entries.get(table);
+        let inner = outer.and_then(|table| table.get_ref().as_table()?.get(key));
+        let entries = inner.and_then(|table| table.get_ref().as_table());
+        let keys = entries.into_iter().flat_map(DeTable::keys);
+        keys.map(|key| Located {
+            value: key.get_ref().to_string(),
+            span: key.span(),
+        })
+        .collect()
+    }
+
     /// The tables of `[[key]]`, titled so.
     pub(super) fn tables(&self, key: &'static str) -> Vec<Table<'a>> {
         let Some(found) = self.find(key) else {

@@ -3,7 +3,7 @@
 use super::diagnostic::ProblemKind;
 use super::file::{Kind, Names, point, pose};
 use super::geometry::{self, Fit, distance_to_wall};
-use super::reader::{Bound, Located, Table};
+use super::reader::{Bound, Located, Problems, Table};
 use super::{Door, Object, Place, Room, Shape, Wall};
 use crate::scenario::diagnostic::suggest;
 use nalgebra::{Point2, Vector2};
@@ -208,23 +208,25 @@ pub(super) fn places(scenario: &Table<'_>, names: &mut Names<'_>, rooms: &[Room]
     places
 }
 
+/// Notes a class of objects that there is not.
+pub(super) fn check_class(problems: &Problems, class: &Located<String>) {
+    if !CLASSES.contains(&class.value.as_str()) {
+        let kind = ProblemKind::UnknownName {
+            kind: "class of object",
+            name: class.value.clone(),
+            help: suggest(&class.value, CLASSES),
+        };
+        problems.add(kind, class.span.clone());
+    }
+}
+
 pub(super) fn objects(scenario: &Table<'_>, names: &mut Names<'_>, rooms: &[Room]) -> Vec<Object> {
     let mut objects = Vec::new();
     for table in scenario.tables("object") {
         let name = names.take(&table, Kind::Object);
         let class = table.require::<String>("class");
-        if let Some(class) = class
-            .as_ref()
-            .filter(|c| !CLASSES.contains(&c.value.as_str()))
-        {
-            let help = suggest(&class.value, CLASSES);
-            let name = class.value.clone();
-            let kind = ProblemKind::UnknownName {
-                kind: "class of object",
-                name,
-                help,
-            };
-            table.problems.add(kind, class.span.clone());
+        if let Some(class) = &class {
+            check_class(table.problems, class);
         }
         let shape = shape(&table);
         let size = table.require::<[f64; 2]>("size");

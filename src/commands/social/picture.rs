@@ -44,17 +44,7 @@ pub(super) fn run(
             "name a .yaml file with `--out`",
         ));
     }
-    let (situation, mut config) = situation(arguments)?;
-    if let Some(method) = arguments.method {
-        config.grouping.method = method;
-    }
-    config.proxemics = arguments.proxemics.unwrap_or(config.proxemics);
-    config.proxemics.levels = arguments.levels.unwrap_or(config.proxemics.levels);
-    if let Some(usage) = arguments.usage {
-        // Of all objects, those included that have a curve of their own.
-        config.usage = usage;
-        config.usage_of.clear();
-    }
+    let (situation, config) = situation(arguments)?;
     let (mut update, mapper) = situation
         .map(&config)
         .map_err(|error| refused(&arguments.file, error))?;
@@ -96,6 +86,21 @@ pub(super) fn run(
     Ok(Answer::Yes)
 }
 
+/// The figures of social mapping as the flags have them.
+fn with_flags(mut config: SocialConfig, arguments: &Arguments) -> SocialConfig {
+    if let Some(method) = arguments.method {
+        config.grouping.method = method;
+    }
+    config.proxemics = arguments.proxemics.unwrap_or(config.proxemics);
+    config.proxemics.levels = arguments.levels.unwrap_or(config.proxemics.levels);
+    if let Some(usage) = arguments.usage {
+        // Of all objects, those included that have a curve of their own.
+        config.usage = usage;
+        config.usage_of.clear();
+    }
+    config
+}
+
 /// A recording's frame, or a scenario at a time, with the figures of social mapping.
 fn situation(arguments: &Arguments) -> Result<(Situation, SocialConfig), Failure> {
     let file = &arguments.file;
@@ -114,7 +119,8 @@ fn situation(arguments: &Arguments) -> Result<(Situation, SocialConfig), Failure
             None => scenario.start,
         };
         let situation = Situation::of_scenario(&scenario, now);
-        return Ok((situation, settings.unwrap_or(scenario.social)));
+        let config = with_flags(settings.unwrap_or(scenario.social), arguments);
+        return Ok((situation, config));
     }
     let text = crate::commands::read_text(file)?;
     let recording = parse_recording(&text).map_err(|error| refused(file, error))?;
@@ -133,7 +139,8 @@ fn situation(arguments: &Arguments) -> Result<(Situation, SocialConfig), Failure
     let frame = recording.at(time);
     let frame = frame.ok_or_else(|| refused(file, "the recording has no frames"))?;
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
-    let config = settings.unwrap_or_default();
+    // How far the picture goes is decided by them.
+    let config = with_flags(settings.unwrap_or_default(), arguments);
     Ok((Situation::of_frame(&name, frame, &config), config))
 }
 

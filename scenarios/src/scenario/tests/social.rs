@@ -18,7 +18,8 @@ fn example() -> &'static str {
 
 #[test]
 fn the_example_of_the_book_is_read() {
-    let text = format!("{TWO_ROOMS}\n{}", example());
+    // Its room is one of another scenario.
+    let text = format!("{TWO_ROOMS}\n{}", example().replace("garden", "hall"));
     let social = parse(&text).expect("a good file").social;
     assert_eq!(social.proxemics.shape, AsymmetricGaussian::HALL);
     assert_eq!(social.grouping.method, Method::Facing);
@@ -61,6 +62,34 @@ fn what_social_mapping_cannot_use_is_told_with_its_place() {
     let problems = with("[social]\nresolution = 0\nclearance_cost = -1");
     assert_eq!(problems.len(), 2, "{problems:?}");
     assert!(problems[0].contains("resolution must be from 0.005 m to 10 m"));
+}
+
+#[test]
+fn names_that_nothing_in_the_scenario_has_are_told_with_what_there_is() {
+    let with = |social: &str| {
+        let invalid = parse(&format!("{TWO_ROOMS}\n[social]\n{social}")).unwrap_err();
+        let problems = invalid.problems.iter();
+        problems
+            .map(|problem| problem.kind.to_string())
+            .collect::<Vec<_>>()
+    };
+    let told = with(
+        "spaces = { tabel = { margin = 0.5 } }\nactivity_in = { hal = \"cooking\" }\n\
+         [social.usage_of.rond]\nleast = 1.0\n",
+    );
+    assert_eq!(
+        told,
+        [
+            "there is no class of object called `tabel`",
+            "there is no room called `hal`",
+            "there is no object called `rond`",
+        ]
+    );
+    // A figure that cannot be is told where it stands.
+    let text = format!("{TWO_ROOMS}\n[social]\nclearance_cost = 1.0\nresolution = 0\n");
+    let invalid = parse(&text).unwrap_err();
+    let line = TWO_ROOMS.lines().count() + 4;
+    assert_eq!(invalid.problems[0].line, line, "{invalid}");
 }
 
 #[test]
