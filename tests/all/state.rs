@@ -1,7 +1,7 @@
 //! The graph on disk, when everything is killed: what was called durable is there again, whole.
 
 use crate::support::{Process, Program, TestInstance, within};
-use dsr::{Durability, Schema, Session, State, Store, Time, Transaction, Value, Version};
+use dsr::{Commit, Durability, Schema, Session, State, Store, Time, Transaction, Value, Version};
 use std::collections::BTreeMap;
 use std::process::{Child, Stdio};
 use std::sync::mpsc;
@@ -296,16 +296,18 @@ fn a_store_by_hand_goes_on_from_its_folder_and_says_what_is_wrong_with_another()
     assert!(said.contains("not a state folder"), "{said}");
 }
 
+/// Commits something that a test finds again.
+fn set(session: &mut Session, speed: f64) -> Commit {
+    let mut transaction = Transaction::new();
+    transaction.set("robot", "max_speed", speed);
+    session.commit(&transaction, Time::default()).unwrap()
+}
+
 #[test]
 fn a_store_by_hand_that_was_killed_leaves_its_graph_to_the_next_by_hand() {
     let instance = TestInstance::new("left");
     let store = ByHand::start(&instance, &[]);
     let mut session = Session::attach(&instance.0, "cortex-graph", PATIENCE).unwrap();
-    let set = |session: &mut Session, speed: f64| {
-        let mut transaction = Transaction::new();
-        transaction.set("robot", "max_speed", speed);
-        session.commit(&transaction, Time::default()).unwrap()
-    };
     let commit = set(&mut session, 0.123);
     let epoch = session.epoch().unwrap();
     let renewed = |session: &mut Session| {
@@ -347,11 +349,6 @@ fn an_instance_has_one_store_and_goes_on_with_its_own_scenario_and_its_own_state
     let instance = TestInstance::new("one");
     let store = ByHand::start(&instance, &[]);
     let mut session = Session::attach(&instance.0, "cortex-graph", PATIENCE).unwrap();
-    let set = |session: &mut Session, speed: f64| {
-        let mut transaction = Transaction::new();
-        transaction.set("robot", "max_speed", speed);
-        session.commit(&transaction, Time::default()).unwrap()
-    };
     let commit = set(&mut session, 0.123);
     let flags = ["--instance", instance.name()];
     let here = [
@@ -412,9 +409,7 @@ fn stores_that_end_before_they_show_what_they_took_over_lose_nothing() {
     let keep = ["--state", path.to_str().unwrap(), "--durable"];
     let store = ByHand::start(&instance, &keep);
     let mut session = Session::attach(&instance.0, "cortex-graph", PATIENCE).unwrap();
-    let mut transaction = Transaction::new();
-    transaction.set("robot", "max_speed", 0.101);
-    let commit = session.commit(&transaction, Time::default()).unwrap();
+    let commit = set(&mut session, 0.101);
     assert!(commit.durable);
     drop((store, session));
     for _ in 0..3 {
