@@ -56,8 +56,9 @@ impl Queues {
     }
 
     /// Adds the successors of a node by some actions, of which some are preferred; of one node's the last
-    /// action comes first: on tasks of the planning competitions a plan is found after a third to nine
-    /// tenths of the states that it takes the other way round, and orders by chance lie between.
+    /// action comes first: in nine of ten larger tasks of the planning competitions a plan is found after a
+    /// quarter to nine tenths of the states that it takes the other way round (in miconic after 1.4 times as
+    /// many), and orders by chance lie between.
     fn push(&mut self, ranks: [Option<Micro>; 2], node: Node, actions: &[u32], preferred: &[u32]) {
         for (which, rank) in ranks.into_iter().enumerate() {
             let Some(rank) = rank else { continue };
