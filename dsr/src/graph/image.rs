@@ -144,11 +144,6 @@ impl Image {
         self.frame.version
     }
 
-    /// Its schema.
-    pub fn schema(&self) -> &Schema {
-        &self.schema
-    }
-
     /// Its time.
     pub fn time(&self) -> Time {
         self.frame.time

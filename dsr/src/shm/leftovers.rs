@@ -156,8 +156,7 @@ pub(super) fn clean<G>(
     config: &Config,
     enter: impl Fn() -> Option<G>,
 ) -> Result<(usize, usize), InstanceError> {
-    orphan::keep(config)?;
-    let members = Members::of(config)?;
+    let members = orphan::keep(config)?;
     // Whoever is known to be dead makes nothing any more.
     remove_half_made(config, |_| true);
     let (mut cleaned, mut failed) = (0, 0);

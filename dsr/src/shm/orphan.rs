@@ -88,13 +88,19 @@ fn graphs(config: &Config) -> Vec<Orphan> {
     graphs
 }
 
+/// The graph that was shown last, and who belongs to the instance, in this order: who made the one was a
+/// member before, and is now if it lives.
+fn newest(config: &Config) -> Result<(Option<Orphan>, Members), InstanceError> {
+    let newest = graphs(config).pop();
+    Ok((newest, Members::of(config)?))
+}
+
 /// Gives the newest graph a second name if its store has ended, for as long as it is the newest. To be
-/// called before anything is removed of those that have ended.
-pub(super) fn keep(config: &Config) -> Result<(), InstanceError> {
-    let Some(newest) = graphs(config).pop().filter(|graph| !graph.is_kept()) else {
-        return Ok(());
-    };
-    if newest.is_left(&Members::of(config)?) {
+/// called before anything is removed of those that have ended. Who belongs to the instance.
+pub(super) fn keep(config: &Config) -> Result<Members, InstanceError> {
+    let (newest, members) = newest(config)?;
+    let left = newest.filter(|graph| !graph.is_kept() && graph.is_left(&members));
+    if let Some(newest) = left {
         let name = format!("{}{}{KEPT}", config.global.prefix, newest.first.epoch.0);
         let kept = newest.path.with_file_name(name);
         match fs::hard_link(&newest.path, &kept) {
@@ -103,7 +109,7 @@ pub(super) fn keep(config: &Config) -> Result<(), InstanceError> {
             linked => linked.map_err(|source| InstanceError::Io { path: kept, source })?,
         }
     }
-    Ok(())
+    Ok(members)
 }
 
 /// Removes the graphs of other lives of the store than that one, which has shown its own.
@@ -116,19 +122,15 @@ pub(super) fn forget(config: &Config, epoch: Epoch) {
 impl Orphan {
     /// That of an instance, if the store that showed its graph last has ended.
     pub(super) fn find(config: &Config) -> Result<Option<Self>, InstanceError> {
-        let Some(newest) = graphs(config).pop() else {
-            return Ok(None);
-        };
-        let left = newest.is_left(&Members::of(config)?);
-        Ok(left.then_some(newest))
+        let (newest, members) = newest(config)?;
+        Ok(newest.filter(|graph| graph.is_left(&members)))
     }
 
     fn is_kept(&self) -> bool {
         name_of(&self.path).ends_with(KEPT)
     }
 
-    /// Whether its store has ended. Of `members` was asked after the file was seen: who made it was one before,
-    /// and is now if it lives.
+    /// Whether its store has ended.
     fn is_left(&self, members: &Members) -> bool {
         let process = processes_in(name_of(&self.path)).next();
         process.is_none_or(|process| members.has_ended(process))

@@ -233,8 +233,8 @@ impl State {
         self.find_about(about::LIFE)
     }
 
-    /// Makes the folder hold `image`, of that life of the store, whatever it held before; rows that are the same already
-    /// stay.
+    /// Makes the folder hold `image`, of that life of the store, whatever it held before; rows that are
+    /// the same already stay.
     ///
     /// # Errors
     /// [`StateError::Newer`] where it held a newer version; [`StateError::Io`].
@@ -276,13 +276,7 @@ impl State {
                 }
             }
         }
-        self.write_about(&write, &image.frame, Some(&image.schema))?;
-        {
-            let mut table = self.done(write.open_table(ABOUT))?;
-            let (format, life) = (self.encode(&FORMAT)?, self.encode(&life)?);
-            self.done(table.insert(about::FORMAT, format.as_slice()))?;
-            self.done(table.insert(about::LIFE, life.as_slice()))?;
-        }
+        self.write_about(&write, &image.frame, Some(&image.schema), Some(life))?;
         self.done(write.commit())
     }
 
@@ -312,7 +306,7 @@ impl State {
                 }
             }
         }
-        self.write_about(&write, &group.frame, group.schema.as_ref())?;
+        self.write_about(&write, &group.frame, group.schema.as_ref(), None)?;
         self.done(write.commit())
     }
 
@@ -321,6 +315,7 @@ impl State {
         write: &redb::WriteTransaction,
         frame: &Frame,
         schema: Option<&Schema>,
+        life: Option<Life>,
     ) -> Result<(), StateError> {
         let mut table = self.done(write.open_table(ABOUT))?;
         let mut put =
@@ -328,6 +323,10 @@ impl State {
         put(about::FRAME, self.encode(frame)?)?;
         if let Some(schema) = schema {
             put(about::SCHEMA, self.encode(schema)?)?;
+        }
+        if let Some(life) = life {
+            put(about::FORMAT, self.encode(&FORMAT)?)?;
+            put(about::LIFE, self.encode(&life)?)?;
         }
         Ok(())
     }
