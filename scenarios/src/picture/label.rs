@@ -200,48 +200,44 @@ fn overlap(a: &[f64; 4], b: &[f64; 4]) -> bool {
 mod tests {
     use super::*;
 
+    const LOOK: Look = Look {
+        size: 12.0,
+        colour: "#000000",
+        bold: false,
+    };
+
     #[test]
     fn words_never_overlap_and_stay_on_the_map() {
         let view = View::new([0.0, 0.0, 10.0, 10.0], 0.0, [0.0, 0.0], [400.0, 400.0]);
         let mut labels = Labels::new(&view);
-        let look = Look {
-            size: 12.0,
-            colour: "#000000",
-            bold: false,
-        };
         let placed = (0..40)
-            .filter(|_| labels.beside(Point2::new(200.0, 200.0), 5.0, "somebody", look))
+            .filter(|_| labels.beside(Point2::new(200.0, 200.0), 5.0, "somebody", LOOK))
             .count();
         assert!((4..=8).contains(&placed), "{placed}");
-        assert!(labels.beside(Point2::new(399.0, 10.0), 2.0, "edge", look));
+        assert!(labels.beside(Point2::new(399.0, 10.0), 2.0, "edge", LOOK));
         labels.keep_off(Point2::new(100.0, 350.0), 40.0);
-        assert!(!labels.centred(Point2::new(100.0, 350.0), "here", look));
+        assert!(!labels.centred(Point2::new(100.0, 350.0), "here", LOOK));
         for (i, a) in labels.taken.iter().enumerate() {
             assert!(a[2] <= 400.0 && labels.taken[..i].iter().all(|b| !overlap(a, b)));
         }
         labels.keep_off_line(Point2::new(20.0, 50.0), Point2::new(380.0, 60.0), 5.0);
-        assert!(!labels.at(Point2::new(290.0, 57.5), "on it", look));
+        assert!(!labels.at(Point2::new(290.0, 57.5), "on it", LOOK));
     }
 
     #[test]
     fn words_lie_on_a_wall_only_where_they_must() {
         let view = View::new([0.0, 0.0, 10.0, 10.0], 0.0, [0.0, 0.0], [400.0, 400.0]);
         let mut labels = Labels::new(&view);
-        let look = Look {
-            size: 12.0,
-            colour: "#000000",
-            bold: false,
-        };
         let wall = 200.0;
         labels.shun_line(Point2::new(wall, 0.0), Point2::new(wall, 400.0), 3.0);
         let on = Point2::new(wall, 200.0);
         let on_wall = |area: &[f64; 4]| area[0] < wall && wall < area[2];
-        assert!(labels.on_thing((on, 8.0), Point2::new(120.0, 200.0), "a television", look));
+        assert!(labels.on_thing((on, 8.0), Point2::new(120.0, 200.0), "a television", LOOK));
         assert!(
             !on_wall(&labels.taken[0]) && labels.taken[0][2] < wall,
             "in its space"
         );
-        assert!(labels.centred(on, "it", look));
+        assert!(labels.centred(on, "it", LOOK));
         assert!(labels.taken.last().is_some_and(on_wall));
     }
 }

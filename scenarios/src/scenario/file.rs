@@ -423,7 +423,7 @@ fn social(scenario: &Table<'_>) -> SocialConfig {
     for problem in config.problems() {
         let message = format!("{} {}", problem.field, problem.requirement);
         let kind = ProblemKind::Figure { message };
-        let place = scenario.span_along(&format!("social.{}", problem.field));
+        let place = scenario.span_of(&format!("social.{}", problem.field));
         scenario.problems.add(kind, place);
     }
     config

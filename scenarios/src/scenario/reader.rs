@@ -184,15 +184,9 @@ impl<'a> Table<'a> {
             .ok()
     }
 
-    /// The span of a key's value, or of the table where it has none.
-    pub(super) fn span_of(&self, key: &str) -> Range<usize> {
-        self.entries
-            .get(key)
-            .map_or_else(|| self.span.clone(), Spanned::span)
-    }
-
-    /// Where the value stands to which the keys of a path lead, or as far as they lead.
-    pub(super) fn span_along(&self, path: &str) -> Range<usize> {
+    /// The span of the value to which a key or a path of keys leads, `a.b`, or as far as it leads: at
+    /// least of the table.
+    pub(super) fn span_of(&self, path: &str) -> Range<usize> {
         let (mut table, mut span) = (Some(self.entries), self.span.clone());
         for key in path.split('.') {
             let Some(value) = table.and_then(|table| table.get(key)) else {
