@@ -11,6 +11,7 @@ use super::statistics::Statistics;
 use super::{MatchError, conjuncts};
 use crate::{Binding, Condition, Effect, Grammar, Pattern, Rule};
 use dsr::{Schema, Snapshot, ValueRange};
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// How the matches of a rule are searched for.
@@ -75,20 +76,11 @@ impl Grammar {
         partial: &Binding,
         limit: u64,
     ) -> Result<SearchPlan, MatchError> {
-        let assumed;
-        let schema = match snapshot {
-            Some(snapshot) => snapshot.schema(),
-            None => {
-                assumed = self.schema_of_names();
-                &assumed
-            }
-        };
+        let schema = self.schema_in(snapshot);
+        let schema = schema.as_ref();
         let problem = Arc::new(self.rule_query(schema, rule)?).at(&rule.name, partial)?;
         let query = Arc::clone(&problem.query);
-        let statistics = match snapshot {
-            Some(snapshot) => Statistics::of(snapshot, &query)?,
-            None => Statistics::assumed(&query),
-        };
+        let statistics = Statistics::known(snapshot, &query)?;
         let plan = Arc::new(plan(&query, &statistics, &problem.given()));
         let seen = snapshot.map(|snapshot| run(snapshot, problem, &plan, limit));
         let (seen, given_up) = seen.transpose()?.unzip();
@@ -120,8 +112,16 @@ impl Grammar {
         })
     }
 
+    /// The schema of a snapshot; without one, a schema of this grammar's names.
+    pub(super) fn schema_in<'a>(&self, snapshot: Option<&'a Snapshot>) -> Cow<'a, Schema> {
+        match snapshot {
+            Some(snapshot) => Cow::Borrowed(snapshot.schema()),
+            None => Cow::Owned(self.schema_of_names()),
+        }
+    }
+
     /// A schema that has every name of the grammar, so that nothing is known to be missing.
-    pub(super) fn schema_of_names(&self) -> Schema {
+    fn schema_of_names(&self) -> Schema {
         let mut schema = Schema::open();
         let mut add = |node: Option<&str>, label: Option<&str>| {
             // A name that no schema can have is in no graph.

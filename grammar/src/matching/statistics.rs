@@ -36,6 +36,11 @@ pub(crate) struct LinkCount {
 }
 
 impl Statistics {
+    /// What a graph says, or without one what is taken for granted.
+    pub(super) fn known<H: Host>(host: Option<&H>, query: &Query) -> Result<Self, ReadError> {
+        host.map_or_else(|| Ok(Self::assumed(query)), |host| Self::of(host, query))
+    }
+
     pub(crate) fn of<H: Host>(host: &H, query: &Query) -> Result<Self, ReadError> {
         let nodes = query.domains.iter().map(|domain| {
             let counts = domain

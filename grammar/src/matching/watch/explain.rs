@@ -39,22 +39,13 @@ impl Grammar {
         &self,
         snapshot: Option<&Snapshot>,
     ) -> Result<Vec<SharedSteps>, MatchError> {
-        let assumed;
-        let schema = match snapshot {
-            Some(snapshot) => snapshot.schema(),
-            None => {
-                assumed = self.schema_of_names();
-                &assumed
-            }
-        };
+        let schema = self.schema_in(snapshot);
+        let schema = schema.as_ref();
         let mut by_label: BTreeMap<LabelId, Vec<Member>> = BTreeMap::new();
         let rules = self.rules.iter().enumerate();
         for (index, rule) in rules.filter(|(_, rule)| rule.left.edges.len() <= LINKS) {
             let query = Arc::new(self.rule_query(schema, rule)?);
-            let statistics = match snapshot {
-                Some(snapshot) => Statistics::of(snapshot, &query)?,
-                None => Statistics::assumed(&query),
-            };
+            let statistics = Statistics::known(snapshot, &query)?;
             for trigger in Triggers::of(&query).edges {
                 if let (true, &Anchor::Slot(from), &Anchor::Slot(to)) =
                     (trigger.makes, &trigger.from, &trigger.to)

@@ -231,6 +231,14 @@ fn a_missed_change_is_made_up_for_and_a_late_one_ignored() {
     assert_eq!((late, watch.count("r")), (MatchDelta::default(), 3));
 }
 
+/// The matches that a change has brought, in words.
+fn added(delta: &MatchDelta) -> Vec<String> {
+    let added = delta.added.iter();
+    added
+        .map(|found| format!("{} {}", found.rule, found.binding))
+        .collect()
+}
+
 #[test]
 fn rules_that_differ_in_names_only_share_their_matches() {
     let grammar = Arc::new(read(
@@ -247,11 +255,7 @@ fn rules_that_differ_in_names_only_share_their_matches() {
     assert_eq!(watch.patterns.len(), 2);
     let change = link(&mut world, "x", "on", "y");
     let delta = watch.update(&change, &world.snapshot()).unwrap();
-    let told: Vec<String> = delta
-        .added
-        .iter()
-        .map(|found| format!("{} {}", found.rule, found.binding))
-        .collect();
+    let told = added(&delta);
     assert_eq!(told, ["up a = 1, b = 2", "down c = 1, d = 2"]);
 }
 
@@ -299,11 +303,7 @@ fn searches_that_begin_alike_are_made_together() {
     let mut watch = Watch::new(grammar, &names, &world.snapshot()).unwrap();
     let change = link(&mut world, "r", "in", "a");
     let delta = watch.update(&change, &world.snapshot()).unwrap();
-    let told: Vec<String> = delta
-        .added
-        .iter()
-        .map(|found| format!("{} {}", found.rule, found.binding))
-        .collect();
+    let told = added(&delta);
     assert_eq!(
         told,
         [
