@@ -4,6 +4,7 @@
 pub mod grid;
 pub mod human_observer;
 pub mod messages;
+pub mod names;
 pub mod navigation;
 pub mod object_recognition;
 pub mod perception;

@@ -11,7 +11,7 @@ use crate::navigation::graph::{Messages, Navigation};
 use crate::navigation::map_age::MapState;
 use crate::object_recognition::ObjectRecognition;
 use crate::social_mapping::config::{ConfigError, SocialConfig};
-use crate::social_mapping::graph::{SocialMapping, StepError};
+use crate::social_mapping::graph::SocialMapping;
 use dsr::{
     AttachError, Begin, InstanceError, LargeError, ReadError, Session, Snapshot, Time, Transaction,
     TurnError,
@@ -102,26 +102,35 @@ pub fn object_recognition(session: Session, begin: Begin) -> Result<(), ProcessE
 /// [`ProcessError`].
 pub fn social_mapping(mut session: Session, begin: Begin) -> Result<(), ProcessError> {
     let (mut writer, mut uncommitted): (Option<GridWriter>, Option<GridUpdate>) = (None, None);
+    let mut stopped: Option<String> = None;
     let core = SocialMapping::new(SocialConfig::default(), MAP_PERIOD);
     let mut core = core.map_err(ProcessError::Config)?;
     let mut turns = begin()?;
     while let Some(tick) = turns.next(&mut session)? {
         let snapshot = session.snapshot()?;
-        let turn = match core.step(tick.time, &snapshot) {
-            Ok(turn) => turn,
-            Err(StepError::Read(error)) => {
-                tracing::debug!("{error}: this turn is left out");
-                continue;
-            }
-            Err(error) => {
-                tracing::warn!(time = %tick.time, "no map: {error}");
-                continue;
-            }
+        let Some(turn) = current(core.step(tick.time, &snapshot))? else {
+            continue;
         };
         for rejection in &turn.rejected {
-            tracing::warn!(time = %tick.time, "{rejection}");
+            if rejection.is_waiting() {
+                tracing::info!(time = %tick.time, "{rejection}");
+            } else {
+                tracing::warn!(time = %tick.time, "{rejection}");
+            }
         }
         let mut transaction = turn.transaction;
+        let why = turn.stopped.map(|error| error.to_string());
+        if let Some(why) = &why {
+            if stopped.as_ref() != Some(why) {
+                tracing::warn!(time = %tick.time, "there is no new map: {why}");
+            }
+            // The grid given out last is not said to hold still.
+            session.submit(&transaction, tick.time)?;
+        }
+        stopped = why;
+        if stopped.is_some() {
+            continue;
+        }
         uncommitted = match turn.grid {
             Some(grid) => Some(grid.after(uncommitted.as_ref())),
             None => uncommitted,

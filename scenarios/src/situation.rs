@@ -5,7 +5,8 @@
 use crate::metrics::mapped;
 use crate::scenario::Scenario;
 use crate::scenes::Frame;
-use agents::social_mapping::scene::{Activity, BODY_RADIUS, Manner, Person, Rejection, SceneError};
+use agents::social_mapping::rejection::Rejection;
+use agents::social_mapping::scene::{Activity, BODY_RADIUS, Manner, Person, SceneError};
 use agents::social_mapping::{
     ConfigError, SocialConfig, SocialMapper, SocialScene, Update, extent,
 };
@@ -76,6 +77,12 @@ impl Situation {
                 },
             });
         }
+        rejected.extend(
+            config
+                .activity_in
+                .keys()
+                .map(|room| Rejection::Room { room: room.clone() }),
+        );
         let mut situation = Self::of_people(name, Time::from_seconds(frame.time), people, config);
         situation.moment = format!("t = {}", frame.time);
         situation.scene.rejected = rejected;
@@ -117,6 +124,7 @@ impl Situation {
         });
         let held = scenario.activities.iter().filter(|one| !one.cancelled);
         let activities = held.map(|activity| Activity {
+            name: activity.name.clone(),
             object: activity.object.clone(),
             start: activity.start,
             end: activity.end,

@@ -150,6 +150,7 @@ impl Trial<'_> {
 
     fn agenda(&self) -> Vec<Activity> {
         let activities = self.scenario.activities.iter().map(|activity| Activity {
+            name: activity.name.clone(),
             object: activity.object.clone(),
             start: activity.start,
             end: activity.end,

@@ -34,6 +34,7 @@ fn map(scenario: &Scenario) -> CostGrid {
         },
     });
     let activities = scenario.activities.iter().map(|activity| scene::Activity {
+        name: activity.name.clone(),
         object: activity.object.clone(),
         start: activity.start,
         end: activity.end,

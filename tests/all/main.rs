@@ -31,6 +31,7 @@ mod robocomp_rules;
 mod rules;
 mod run;
 mod social;
+mod social_input;
 mod state;
 mod store;
 mod support;

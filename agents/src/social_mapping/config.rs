@@ -10,7 +10,9 @@ use super::limits::{MOST_COST, is_length};
 use super::object_space::{Space, UsageCurve};
 use super::personal::{self, CooperationZone, MOST_ZONES};
 use super::zones::{Levels, Proxemics};
+use crate::names::suggestion;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// All figures of the social map; every one has the papers' or our documented default.
@@ -94,7 +96,7 @@ pub struct ConfigError {
     /// The field at fault.
     pub field: String,
     /// What it has to be.
-    pub requirement: &'static str,
+    pub requirement: Cow<'static, str>,
 }
 
 impl SocialConfig {
@@ -173,14 +175,6 @@ impl SocialConfig {
             let requirement = "needs four widths from 0.001 m to 1000 m";
             (format!("activities.{name}"), shape.is_valid(), requirement)
         }));
-        checks.extend(self.activity_in.iter().map(|(room, activity)| {
-            let known = self.activities.contains_key(activity);
-            (
-                format!("activity_in.{room}"),
-                known,
-                "needs the name of an activity",
-            )
-        }));
         checks.extend(self.cooperation.iter().map(|(task, zones)| {
             let valid = zones.len() <= MOST_ZONES && zones.iter().all(CooperationZone::is_valid);
             let requirement =
@@ -188,11 +182,6 @@ impl SocialConfig {
             (format!("cooperation.{task}"), valid, requirement)
         }));
         checks.extend([
-            (
-                "features".to_owned(),
-                self.features.is_valid(),
-                "needs levels above 0 and at most 1, and influences from -1 to 1",
-            ),
             (
                 "walls".to_owned(),
                 self.walls.is_none_or(|walls| walls.is_valid()),
@@ -206,12 +195,53 @@ impl SocialConfig {
                  from 0.001 m to 10 m; field_of_view above 0 and at most pi",
             ),
         ]);
-        checks
+        let figures = checks
             .into_iter()
             .filter(|(_, sound, _)| !sound)
-            .map(|(field, _, requirement)| ConfigError { field, requirement })
+            .map(|(field, _, requirement)| (field, requirement.into()));
+        let features = self.features.problems().into_iter();
+        let features =
+            features.map(|(path, requirement)| (format!("features.{path}"), requirement.into()));
+        let activities: Vec<&str> = self.activities.keys().map(String::as_str).collect();
+        let unknown = self.activity_in.iter().filter_map(|(room, activity)| {
+            let none = unknown("the name of an activity", activity, &activities)?;
+            Some((format!("activity_in.{room}"), none.into()))
+        });
+        figures
+            .chain(features)
+            .chain(unknown)
+            .map(|(field, requirement)| ConfigError { field, requirement })
             .collect()
     }
+
+    /// The names of rooms and, where `classes` are known, of classes of objects that there are not. What the
+    /// defaults name may be missing.
+    pub fn unknown_names(&self, rooms: &[String], classes: Option<&[&str]>) -> Vec<ConfigError> {
+        let usual = Self::default();
+        let rooms: Vec<&str> = rooms.iter().map(String::as_str).collect();
+        let rooms = self
+            .activity_in
+            .keys()
+            .filter_map(|name| Some(("activity_in", unknown("names of rooms", name, &rooms)?)));
+        let classes = self
+            .spaces
+            .keys()
+            .filter(|class| !usual.spaces.contains_key(*class))
+            .filter_map(|name| Some(("spaces", unknown("classes of objects", name, classes?)?)));
+        rooms
+            .chain(classes)
+            .map(|(field, requirement)| ConfigError {
+                field: field.to_owned(),
+                requirement: requirement.into(),
+            })
+            .collect()
+    }
+}
+
+/// What is to be said of a name that is not among those known.
+fn unknown(needed: &str, name: &str, known: &[&str]) -> Option<String> {
+    let help = || suggestion(name, known.iter().copied());
+    (!known.contains(&name)).then(|| format!("needs {needed}, and `{name}` is none{}", help()))
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 //! the greater, and an influence in [-1, 1] on each of the four sides.
 
 use super::four_sided::FourSided;
+use crate::names::suggestion;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -112,34 +113,54 @@ pub enum FeatureError {
         text: String,
     },
     /// No such feature.
-    #[error("there is no feature `{name}`; there are {known}")]
+    #[error("there is no feature called `{name}`{help}")]
     Unknown {
         /// The name given.
         name: String,
-        /// The names there are.
-        known: String,
+        /// The nearest name, or all.
+        help: String,
     },
     /// Neither a level's name nor a number in (0, 1].
     #[error(
-        "`{value}` is no value of {feature}: a number above 0 and at most 1, or one of {known}"
+        "`{value}` is no value of {feature}, which is a number above 0 and at most 1 or the name of a level{help}"
     )]
     Value {
         /// The feature.
         feature: String,
         /// The value given.
         value: String,
-        /// The names of its levels.
-        known: String,
+        /// The nearest name of a level, or all.
+        help: String,
     },
 }
 
 impl Features {
-    /// Whether all levels and influences are within their ranges.
-    pub fn is_valid(&self) -> bool {
-        self.known.values().all(|feature| {
-            feature.levels.values().all(|v| *v > 0.0 && *v <= 1.0)
-                && feature.influence.sides().iter().all(|i| i.abs() <= 1.0)
-        })
+    /// Each level and influence that is outside of its range, by the path to it, and what it must be.
+    pub fn problems(&self) -> Vec<(String, &'static str)> {
+        let mut found = Vec::new();
+        for (name, feature) in &self.known {
+            for (level, value) in &feature.levels {
+                if !(*value > 0.0 && *value <= 1.0) {
+                    found.push((
+                        format!("known.{name}.levels.{level}"),
+                        "must be above 0 and at most 1",
+                    ));
+                }
+            }
+            for (side, value) in ["front", "left", "rear", "right"]
+                .iter()
+                .zip(feature.influence.sides())
+            {
+                // Also what is no number.
+                if !(-1.0..=1.0).contains(&value) {
+                    found.push((
+                        format!("known.{name}.influence.{side}"),
+                        "must be from -1 to 1",
+                    ));
+                }
+            }
+        }
+        found
     }
 
     /// Reads `emotional_state=happy, food_need=0.9`: any number of features, separated by commas,
@@ -148,9 +169,6 @@ impl Features {
     /// # Errors
     /// [`FeatureError`], the first.
     pub fn parse(&self, text: &str) -> Result<BTreeMap<String, f64>, FeatureError> {
-        let names = |names: &mut dyn Iterator<Item = &String>| {
-            names.cloned().collect::<Vec<String>>().join(", ")
-        };
         let mut values = BTreeMap::new();
         for part in text.split(',').map(str::trim).filter(|p| !p.is_empty()) {
             let (name, value) = part.split_once('=').ok_or_else(|| FeatureError::Form {
@@ -159,14 +177,14 @@ impl Features {
             let (name, value) = (name.trim(), value.trim());
             let feature = self.known.get(name).ok_or_else(|| FeatureError::Unknown {
                 name: name.to_owned(),
-                known: names(&mut self.known.keys()),
+                help: suggestion(name, self.known.keys().map(String::as_str)),
             })?;
             let number = feature.levels.get(value).copied();
             let number = number.or_else(|| value.parse().ok().filter(|v| *v > 0.0 && *v <= 1.0));
             let number = number.ok_or_else(|| FeatureError::Value {
                 feature: name.to_owned(),
                 value: value.to_owned(),
-                known: names(&mut feature.levels.keys()),
+                help: suggestion(value, feature.levels.keys().map(String::as_str)),
             })?;
             values.insert(name.to_owned(), number);
         }
@@ -267,14 +285,24 @@ mod tests {
         }
         let open = apply(&features, "emotional_state=1, food_need=1, role=1");
         assert!((open.front - 0.2).abs() < 1e-12);
-        assert!(features.is_valid());
+        assert_eq!(features.problems(), []);
         features
             .known
             .entry("role".into())
             .or_default()
             .influence
             .left = 1.5;
-        assert!(!features.is_valid());
+        features
+            .known
+            .entry("food_need".into())
+            .or_default()
+            .levels
+            .insert("some".into(), 0.0);
+        let told = features.problems().into_iter().map(|(path, _)| path);
+        assert_eq!(
+            told.collect::<Vec<_>>(),
+            ["known.food_need.levels.some", "known.role.influence.left"]
+        );
     }
 
     #[test]
@@ -293,11 +321,12 @@ mod tests {
         assert_eq!(refused("happy"), "`happy` is not feature=value");
         assert_eq!(
             refused("mood=happy"),
-            "there is no feature `mood`; there are beverage_need, emotional_state, food_need, role"
+            "there is no feature called `mood`; known are: beverage_need, emotional_state, food_need, role"
         );
         assert_eq!(
             refused("food_need=0"),
-            "`0` is no value of food_need: a number above 0 and at most 1, or one of need, neutral, not_need"
+            "`0` is no value of food_need, which is a number above 0 and at most 1 or the name of a level; \
+             known are: need, neutral, not_need"
         );
     }
 }

@@ -3,16 +3,21 @@
 //! writes nothing.
 
 mod groups;
+mod problems;
 mod read;
+mod settings;
 
 use groups::GroupNodes;
 pub use groups::{EXTENT, FEATURES, GROUP, MEMBER};
+pub use problems::PROBLEMS;
 pub use read::scene;
+use settings::Settings;
 
 use super::adaptation::Passage;
 use super::config::{ConfigError, SocialConfig};
 use super::map::{ObjectUse, PersonSpaces, SocialMapper, Update};
-use super::scene::{Rejection, SceneError};
+use super::rejection::Rejection;
+use super::scene::SceneError;
 use crate::grid::Region;
 use crate::grid::shared::GridUpdate;
 use dsr::{Node, Operation, Owner, Snapshot, Time, Transaction, Value};
@@ -227,21 +232,22 @@ pub struct Turn {
     pub transaction: Transaction,
     /// What was left out or mended, where that differs from the turn before.
     pub rejected: Vec<Rejection>,
+    /// Why no map was made, where none was: the one given out last is all there is.
+    pub stopped: Option<StepError>,
 }
 
 /// The agent's turns: reads the graph, updates the map, says what to write and send.
 #[derive(Debug, Clone)]
 pub struct SocialMapping {
     mapper: SocialMapper,
-    /// The settings read last, and what was wrong with them.
-    settings: Option<String>,
-    refused: Vec<Rejection>,
+    settings: Settings,
     groups: GroupNodes,
     period: f64,
     updated: Option<Time>,
     /// Where the grid differs from the one given out last.
     unsent: Region,
-    rejected: Vec<Rejection>,
+    /// What was told last. As text: what is no number equals nothing, itself included.
+    told: Vec<String>,
 }
 
 impl SocialMapping {
@@ -253,27 +259,45 @@ impl SocialMapping {
         let mapper = SocialMapper::new(config)?;
         Ok(Self {
             mapper,
-            settings: None,
-            refused: Vec::new(),
+            settings: Settings::default(),
             groups: GroupNodes::new(),
             period,
             updated: None,
             unsent: Region::default(),
-            rejected: Vec::new(),
+            told: Vec::new(),
         })
     }
 
-    /// One turn at `now` on the graph as of `snapshot`.
+    /// One turn at `now` on the graph as of `snapshot`. Where no map can be made the turn says why, and the next one
+    /// starts where the last good one ended.
     ///
     /// # Errors
-    /// [`StepError`]; the next turn starts where the last good one ended.
-    pub fn step(&mut self, now: Time, snapshot: &Snapshot) -> Result<Turn, StepError> {
+    /// The snapshot cannot be read any more.
+    pub fn step(&mut self, now: Time, snapshot: &Snapshot) -> Result<Turn, dsr::ReadError> {
         if !is_due(self.updated, now, self.period) {
             return Ok(Turn::default());
         }
-        self.read_settings(snapshot).map_err(ReadError::from)?;
+        match self.map(now, snapshot) {
+            Ok(turn) => Ok(turn),
+            Err(StepError::Read(ReadError::Snapshot(error))) => Err(error),
+            Err(error) => {
+                let mut turn = Turn::default();
+                let refused = self.settings.refused();
+                problems::write(refused, Some(&error), snapshot, &mut turn.transaction)?;
+                turn.stopped = Some(error);
+                Ok(turn)
+            }
+        }
+    }
+
+    fn map(&mut self, now: Time, snapshot: &Snapshot) -> Result<Turn, StepError> {
+        if let Some(mapper) = self.settings.read(snapshot).map_err(ReadError::from)? {
+            self.mapper = mapper;
+        }
         let mut scene = scene(snapshot, self.mapper.config())?;
-        scene.rejected.extend(self.refused.iter().cloned());
+        scene
+            .rejected
+            .extend(self.settings.refused().iter().cloned());
         let update = self.mapper.update(now, &scene)?;
         // Reading may fail yet, and the next update would not call the change a change.
         self.unsent = self.unsent.joined(&update.dirty);
@@ -281,57 +305,27 @@ impl SocialMapping {
         self.groups
             .write(now, &update, snapshot, &mut transaction)
             .map_err(ReadError::from)?;
+        problems::write(&update.rejected, None, snapshot, &mut transaction)
+            .map_err(ReadError::from)?;
         self.updated = Some(now);
         let dirty = std::mem::take(&mut self.unsent);
         let grid = (!dirty.is_empty()).then(|| GridUpdate {
             dirty,
             grid: Arc::clone(&update.grid),
         });
-        let rejected = if update.rejected == self.rejected {
+        let told: Vec<String> = update.rejected.iter().map(ToString::to_string).collect();
+        let rejected = if told == self.told {
             Vec::new()
         } else {
-            self.rejected.clone_from(&update.rejected);
+            self.told = told;
             update.rejected
         };
         Ok(Turn {
             grid,
             transaction,
             rejected,
+            stopped: None,
         })
-    }
-}
-
-impl SocialMapping {
-    /// Takes over the world's settings where they changed. Those that cannot be used are reported and
-    /// leave all as it was.
-    fn read_settings(&mut self, snapshot: &Snapshot) -> Result<(), dsr::ReadError> {
-        let Some(world) = snapshot.nodes_of("world").next().transpose()? else {
-            return Ok(());
-        };
-        let value = world.value(SETTINGS)?;
-        let text = value.as_ref().and_then(Value::as_str);
-        if text == self.settings.as_deref() {
-            return Ok(());
-        }
-        self.refused.clear();
-        let read = serde_json::from_str::<SocialConfig>(text.unwrap_or("{}"));
-        let made = read
-            .map_err(|error| vec![error.to_string()])
-            .and_then(|config| {
-                let told =
-                    |problems: Vec<ConfigError>| problems.iter().map(ToString::to_string).collect();
-                SocialMapper::new(config).map_err(told)
-            });
-        match made {
-            Ok(mapper) => self.mapper = mapper,
-            Err(problems) => self.refused.extend(
-                problems
-                    .into_iter()
-                    .map(|problem| Rejection::Settings { problem }),
-            ),
-        }
-        self.settings = text.map(str::to_owned);
-        Ok(())
     }
 }
 

@@ -8,11 +8,13 @@ use super::found::{FoundGroup, found_groups};
 use super::four_sided::FourSided;
 use super::layers::Layer;
 use super::personal::{CooperationZone, passages_of, shape_of};
-use super::scene::{Object, Person, Rejection, SceneError, SocialScene};
+use super::rejection::Rejection;
+use super::scene::{Object, Person, SceneError, SocialScene};
 use super::stamps::Stamp;
 use super::visibility::visible;
 use super::zones::{Cuts, Zone};
 use crate::grid::{CostGrid, Region};
+use crate::names::suggestion;
 use dsr::Time;
 use nalgebra::{Isometry2, Point2};
 use std::borrow::Cow;
@@ -125,14 +127,7 @@ impl SocialMapper {
         let mut rejected = scene.rejected.clone();
         let people = scene.sound_people(&mut rejected);
         let objects = scene.sound_objects(&mut rejected);
-        scene.check_activities(
-            |name| {
-                objects
-                    .iter()
-                    .any(|o| o.name == name && self.config.spaces.contains_key(&o.class))
-            },
-            &mut rejected,
-        );
+        scene.check_uses(&objects, &self.config, &mut rejected);
 
         let fresh = self.drawn.take().filter(|drawn| drawn.fits(scene));
         let first = fresh.is_none();
@@ -284,7 +279,7 @@ impl SocialMapper {
                 name: person.name.clone(),
                 what,
                 given: given.to_owned(),
-                known: known.join(", "),
+                help: suggestion(given, known),
             });
         };
         let (activities, tasks) = (&self.config.activities, &self.config.cooperation);

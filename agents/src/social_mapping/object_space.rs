@@ -7,6 +7,7 @@ use super::preset::{Named, Preset, named_or_table};
 use dsr::Time;
 use nalgebra::{Isometry2, Point2, Vector2};
 use serde::{Deserialize, Serialize};
+use std::cmp::Ordering;
 use std::f64::consts::TAU;
 
 /// Points on the outline of a round space.
@@ -155,26 +156,35 @@ pub struct Agenda {
     end: Time,
 }
 
-/// An activity that ends before it starts.
+/// An activity that does not end after it starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the activity ends at {end}, before it starts at {start}")]
-pub struct EndsBeforeStart {
-    /// When it starts.
-    pub start: Time,
-    /// When it ends.
-    pub end: Time,
+pub enum NoDuration {
+    /// It ends before.
+    #[error("it ends at {end}, before it starts at {start}")]
+    Backward {
+        /// When it starts.
+        start: Time,
+        /// When it ends.
+        end: Time,
+    },
+    /// It ends at the same time.
+    #[error("it ends when it starts, at {at}")]
+    Momentary {
+        /// When.
+        at: Time,
+    },
 }
 
 impl Agenda {
     /// The entry from `start` to `end`, both included.
     ///
     /// # Errors
-    /// [`EndsBeforeStart`] where it does.
-    pub fn new(start: Time, end: Time) -> Result<Self, EndsBeforeStart> {
-        if end < start {
-            Err(EndsBeforeStart { start, end })
-        } else {
-            Ok(Self { start, end })
+    /// [`NoDuration`] where it does not end after it starts.
+    pub fn new(start: Time, end: Time) -> Result<Self, NoDuration> {
+        match end.cmp(&start) {
+            Ordering::Less => Err(NoDuration::Backward { start, end }),
+            Ordering::Equal => Err(NoDuration::Momentary { at: start }),
+            Ordering::Greater => Ok(Self { start, end }),
         }
     }
 
@@ -370,7 +380,10 @@ mod tests {
             assert!((curve.usage(at(minutes), &agenda) - 3.5).abs() < 1e-12);
         }
         let error = Agenda::new(at(10.0), at(9.0)).unwrap_err();
-        assert_eq!((error.start, error.end), (at(10.0), at(9.0)));
+        let (start, end) = (at(10.0), at(9.0));
+        assert_eq!(error, NoDuration::Backward { start, end });
+        let error = Agenda::new(at(9.0), at(9.0)).unwrap_err();
+        assert_eq!(error, NoDuration::Momentary { at: at(9.0) });
     }
 
     #[test]

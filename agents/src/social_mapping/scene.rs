@@ -2,10 +2,10 @@
 //! map itself would be wrong the scene is refused; where one item is bad, the item alone is left
 //! out or mended as its [`Rejection`] says, and always reported.
 
-use super::features::FeatureError;
-use super::groups::TooCrowded;
-use super::limits::{LARGEST_BODY, MOST_LENGTH, MOST_SPEED};
-use super::object_space::{Agenda, EndsBeforeStart, Outline};
+use super::config::SocialConfig;
+use super::limits::{LARGEST_BODY, MOST_SPEED};
+use super::object_space::{Agenda, Outline};
+use super::rejection::{Rejection, UsedBy};
 use dsr::Time;
 use nalgebra::{Isometry2, Point2, Vector2};
 use std::borrow::Cow;
@@ -89,6 +89,8 @@ pub struct Object {
 /// Something scheduled with an object.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Activity {
+    /// What it is called.
+    pub name: String,
     /// The object's name.
     pub object: String,
     /// When it starts.
@@ -134,111 +136,6 @@ pub enum SceneError {
 
 /// The largest grid that is made: 100 MB of costs.
 pub const MOST_CELLS: f64 = 25e6;
-
-/// An item that was left out of the map or mended.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Rejection {
-    /// The person is left out.
-    #[error("person {name} is ignored: the pose is no place within {FARTHEST:e} m")]
-    PersonPose {
-        /// The person.
-        name: String,
-    },
-    /// The person counts as standing still.
-    #[error(
-        "person {name} is taken to stand still: the velocity is none of up to {MOST_SPEED} m/s"
-    )]
-    PersonVelocity {
-        /// The person.
-        name: String,
-    },
-    /// The person has the radius [`BODY_RADIUS`].
-    #[error("person {name} is given the usual radius: {radius} m is none up to {LARGEST_BODY} m")]
-    PersonRadius {
-        /// The person.
-        name: String,
-        /// As given.
-        radius: f64,
-    },
-    /// The object is left out.
-    #[error(
-        "object {name} is ignored: its pose is no place within {FARTHEST:e} m, or its size none of up to \
-         {MOST_LENGTH} m"
-    )]
-    Object {
-        /// The object.
-        name: String,
-    },
-    /// The person counts as doing nothing in particular, or as working with the robot at nothing.
-    #[error("person {name}: there is no {what} `{given}`; there are {known}")]
-    PersonManner {
-        /// The person.
-        name: String,
-        /// `activity` or `task`.
-        what: &'static str,
-        /// As given.
-        given: String,
-        /// The names in the configuration.
-        known: String,
-    },
-    /// The person's features are left out.
-    #[error("person {name} has no features: {error}")]
-    PersonFeatures {
-        /// The person.
-        name: String,
-        /// What is wrong.
-        error: FeatureError,
-    },
-    /// The settings stay as they were.
-    #[error("the social settings of the world are not used: {problem}")]
-    Settings {
-        /// What is wrong.
-        problem: String,
-    },
-    /// Nobody is in a group.
-    #[error(transparent)]
-    Groups(#[from] TooCrowded),
-    /// The space between the two is left out.
-    #[error("{name} and {other} interact, but nobody called {missing} has a place")]
-    Interaction {
-        /// One of them.
-        name: String,
-        /// The other.
-        other: String,
-        /// Whom the map does not have.
-        missing: String,
-    },
-    /// The space between the two is left out: nobody talks across that distance.
-    #[error("{name} and {other} interact at {distance:.1} m: too far for a space between them")]
-    InteractionTooFar {
-        /// One of them.
-        name: String,
-        /// The other.
-        other: String,
-        /// Between them, metres.
-        distance: f64,
-    },
-    /// The activity is left out.
-    #[error("an activity with {object} is ignored: {error}")]
-    ActivityOrder {
-        /// The object.
-        object: String,
-        /// What is wrong.
-        error: EndsBeforeStart,
-    },
-    /// The activity is left out.
-    #[error("activity {activity} is ignored: its start or end is not a time")]
-    ActivityTime {
-        /// The activity.
-        activity: String,
-    },
-    /// The activity has no effect.
-    #[error("an activity uses {object}, which the map does not have or which has no space")]
-    ActivityObject {
-        /// The name given.
-        object: String,
-    },
-}
 
 impl SocialScene {
     /// Whether a map can be made of the scene at `resolution` metres a cell.
@@ -305,7 +202,7 @@ impl SocialScene {
     }
 
     /// The agenda of one object. Backward activities are left out here and reported by
-    /// [`Self::check_activities`].
+    /// [`Self::check_uses`].
     pub(super) fn agenda(&self, object: &str) -> Vec<Agenda> {
         self.activities
             .iter()
@@ -314,18 +211,43 @@ impl SocialScene {
             .collect()
     }
 
-    /// Reports activities that are backward, or whose object is not among those `usable`.
-    pub(super) fn check_activities<'a>(
+    /// Reports what of the agenda and of R(t) is without effect: activities that do not end after they start, and objects
+    /// that nobody has seen or that have no space.
+    pub(super) fn check_uses(
         &self,
-        usable: impl Fn(&str) -> bool + 'a,
+        objects: &[&Object],
+        config: &SocialConfig,
         rejected: &mut Vec<Rejection>,
     ) {
+        let mut used: Vec<(UsedBy, &str)> = Vec::new();
         for activity in &self.activities {
-            let object = activity.object.clone();
-            if let Err(error) = Agenda::new(activity.start, activity.end) {
-                rejected.push(Rejection::ActivityOrder { object, error });
-            } else if !usable(&object) {
-                rejected.push(Rejection::ActivityObject { object });
+            let name = activity.name.clone();
+            match Agenda::new(activity.start, activity.end) {
+                Ok(_) => used.push((UsedBy::Activity(name), &activity.object)),
+                Err(error) => rejected.push(Rejection::ActivityOrder {
+                    activity: name,
+                    error,
+                }),
+            }
+        }
+        let named = config.usage_of.keys();
+        used.extend(named.map(|object| (UsedBy::Settings, object.as_str())));
+        for (by, object) in used {
+            let seen = objects.iter().find(|one| one.name == object);
+            let object = object.to_owned();
+            match seen {
+                Some(seen) if config.spaces.contains_key(&seen.class) => {}
+                Some(seen) => rejected.push(Rejection::NoSpace {
+                    by,
+                    object,
+                    class: seen.class.clone(),
+                }),
+                None => {
+                    let known = objects.iter().map(|one| one.name.as_str());
+                    // What is not seen yet is no misspelling of all that is.
+                    let near = dsr::suggest(&object, known);
+                    rejected.push(Rejection::Unseen { by, object, near });
+                }
             }
         }
     }

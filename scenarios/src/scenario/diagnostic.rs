@@ -212,6 +212,9 @@ pub enum ProblemKind {
     /// A duration that is no duration.
     #[error("this activity ends before it starts")]
     EndsBeforeStart,
+    /// A duration of nothing.
+    #[error("this activity ends when it starts")]
+    EndsAtStart,
     /// A schedule that says nothing, or two things at once.
     #[error("{message}")]
     BadEntry {
@@ -264,15 +267,5 @@ impl Diagnostic for Problem {
         Some(Box::new(std::iter::once(LabeledSpan::new_with_span(
             None, self.span,
         ))))
-    }
-}
-
-/// "did you mean ...?" where something near exists, else what there is.
-pub(crate) fn suggest<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> String {
-    let known: Vec<&str> = known.into_iter().collect();
-    match dsr::suggest(wrong, known.iter().copied()) {
-        Some(name) => format!("did you mean `{name}`?"),
-        None if known.is_empty() => String::new(),
-        None => format!("known are: {}", known.join(", ")),
     }
 }

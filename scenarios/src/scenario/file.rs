@@ -1,12 +1,13 @@
 //! The main file, `scenario.toml`, as a whole: the order in which its tables are read, and the
 //! names that they share. Names are unique over all tables, because they become node names.
 
-use super::diagnostic::{Invalid, Problem, ProblemKind, suggest};
+use super::diagnostic::{Invalid, Problem, ProblemKind};
 use super::reader::{Bound, Located, Problems, Table};
 use super::value::{DAY, Period, Preemption};
 use super::{Mission, Scenario, TracksFrame};
 use super::{devices, people, schedule, space};
 use agents::human_observer;
+use agents::names::suggest;
 use agents::social_mapping::SocialConfig;
 use dsr::Time;
 use jiff::Timestamp;
@@ -265,6 +266,7 @@ fn whole(table: &Table<'_>, text: &str, read: Read<'_>) -> Scenario {
     let tracks = tracks(table);
     let social = social(table);
     check_names(table, &names);
+    check_classes(table);
     let human_observer = human_observer(table);
     Scenario {
         name,
@@ -384,17 +386,30 @@ fn tracks(scenario: &Table<'_>) -> TracksFrame {
     tracks
 }
 
-/// The figures of social mapping by themselves: a file with the table `[social]` alone.
+/// The figures of social mapping by themselves: a file with the table `[social]` alone. Rooms and objects that it names are
+/// those of `scenario`; without one there are none, and mapping reports what is without effect.
 ///
 /// # Errors
 /// Every problem found, each with its line and column.
-pub fn parse_social(file: &str, text: &str) -> Result<SocialConfig, Box<Invalid>> {
+pub fn parse_social(
+    file: &str,
+    text: &str,
+    scenario: Option<&Scenario>,
+) -> Result<SocialConfig, Box<Invalid>> {
     let read = || {
         let document = document(text)?;
         let problems = Problems::default();
         let title = "the settings".to_owned();
         let table = Table::new(document.get_ref(), 0..0, title, &problems);
         let config = social(&table);
+        check_classes(&table);
+        if let Some(scenario) = scenario {
+            let mut names = Names::new(text);
+            let rooms = scenario.rooms.iter().map(|one| (&one.name, Kind::Room));
+            let objects = scenario.objects.iter().map(|one| (&one.name, Kind::Object));
+            names.take_elsewhere(rooms.chain(objects));
+            check_names(&table, &names);
+        }
         table.close();
         let problems = problems.into_vec();
         if problems.is_empty() {
@@ -442,6 +457,10 @@ fn check_names(scenario: &Table<'_>, names: &Names<'_>) {
             }
         }
     }
+}
+
+/// Notes the classes of objects in `[social]` that there are not.
+fn check_classes(scenario: &Table<'_>) {
     for class in scenario.keys_of("social", "spaces") {
         space::check_class(scenario.problems, &class);
     }

@@ -1,8 +1,9 @@
 //! Reads typed values out of a TOML document and notes every problem with its place. A table knows
 //! which keys were asked of it, so that it can name the ones nobody reads.
 
-use super::diagnostic::{Problem, ProblemKind, suggest};
+use super::diagnostic::{Problem, ProblemKind};
 use super::value::{Value, is_finite};
+use agents::names::suggest;
 use std::cell::RefCell;
 use std::ops::Range;
 use toml::Spanned;

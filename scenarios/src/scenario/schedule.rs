@@ -8,6 +8,7 @@ use super::reader::{Problems, Table};
 use super::{Activity, Scenario};
 use dsr::Time;
 use jiff::civil::{Date, Time as ClockTime};
+use std::cmp::Ordering;
 
 /// Reads a schedule by itself: the tables `[[activity]]` of a file, at clock times of the day of `day`.
 /// Whether there are such objects is not asked.
@@ -84,10 +85,13 @@ pub(super) fn activities(file: &Table<'_>, names: &mut Names<'_>, day: Date) -> 
         );
         let cancelled = table.get("cancelled").is_some_and(|flag| flag.value);
         if let (Some(start), Some(end)) = clocks {
-            if end <= start {
-                table
-                    .problems
-                    .add(ProblemKind::EndsBeforeStart, table.span_of("end"));
+            let wrong = match end.cmp(&start) {
+                Ordering::Less => Some(ProblemKind::EndsBeforeStart),
+                Ordering::Equal => Some(ProblemKind::EndsAtStart),
+                Ordering::Greater => None,
+            };
+            if let Some(wrong) = wrong {
+                table.problems.add(wrong, table.span_of("end"));
             }
             let times = time_of_day(day, start).zip(time_of_day(day, end));
             if let (Some(name), Some(object), Some((start, end))) = (name, object, times) {

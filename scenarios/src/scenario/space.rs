@@ -5,7 +5,7 @@ use super::file::{Kind, Names, point, pose};
 use super::geometry::{self, Fit, distance_to_wall};
 use super::reader::{Bound, Located, Problems, Table};
 use super::{Door, Object, Place, Room, Shape, Wall};
-use crate::scenario::diagnostic::suggest;
+use agents::names::suggest;
 use nalgebra::{Point2, Vector2};
 use std::ops::Range;
 

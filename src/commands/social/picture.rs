@@ -104,16 +104,9 @@ fn with_flags(mut config: SocialConfig, arguments: &Arguments) -> SocialConfig {
 /// A recording's frame, or a scenario at a time, with the figures of social mapping.
 fn situation(arguments: &Arguments) -> Result<(Situation, SocialConfig), Failure> {
     let file = &arguments.file;
-    let settings = match &arguments.settings {
-        Some(path) => {
-            let text = crate::commands::read_text(path)?;
-            let read = parse_social(&path.display().to_string(), &text);
-            Some(read.map_err(|invalid| Failure::Input((*invalid).into()))?)
-        }
-        None => None,
-    };
     if file.is_dir() {
         let scenario: Scenario = crate::commands::load_scenario(file)?;
+        let settings = settings(arguments, Some(&scenario))?;
         let now = match &arguments.at {
             Some(at) => time_of_day(at, scenario.start)?,
             None => scenario.start,
@@ -122,6 +115,7 @@ fn situation(arguments: &Arguments) -> Result<(Situation, SocialConfig), Failure
         let config = with_flags(settings.unwrap_or(scenario.social), arguments);
         return Ok((situation, config));
     }
+    let settings = settings(arguments, None)?;
     let text = crate::commands::read_text(file)?;
     let recording = parse_recording(&text).map_err(|error| refused(file, error))?;
     let time = match &arguments.at {
@@ -142,6 +136,20 @@ fn situation(arguments: &Arguments) -> Result<(Situation, SocialConfig), Failure
     // How far the picture goes is decided by them.
     let config = with_flags(settings.unwrap_or_default(), arguments);
     Ok((Situation::of_frame(&name, frame, &config), config))
+}
+
+/// The figures of the file that `--settings` names, where it names one; rooms and objects are those of the scenario.
+fn settings(
+    arguments: &Arguments,
+    scenario: Option<&Scenario>,
+) -> Result<Option<SocialConfig>, Failure> {
+    let Some(path) = &arguments.settings else {
+        return Ok(None);
+    };
+    let text = crate::commands::read_text(path)?;
+    let read = parse_social(&path.display().to_string(), &text, scenario);
+    read.map(Some)
+        .map_err(|invalid| Failure::Input((*invalid).into()))
 }
 
 /// `HH:MM` or `HH:MM:SS` of the scenario's day.

@@ -40,6 +40,8 @@ fn change(
         let node = node?;
         there.insert(node.name()?, node);
     }
+    let seen = snapshot.nodes_of("object").map(|node| node?.name());
+    let seen = seen.collect::<Result<Vec<_>, _>>()?;
     let mut transaction = Transaction::new();
     let mut told = String::new();
     for activity in activities {
@@ -80,9 +82,14 @@ fn change(
             "{name}: {start} to {end} at {}{cancelled} ({what})",
             activity.object
         );
-        if snapshot.find_node_by_name(&activity.object)?.is_none() {
+        if !seen.contains(&activity.object) {
             let object = &activity.object;
-            let _ = writeln!(told, "  nothing called {object} has been seen so far");
+            let near = dsr::suggest(object, seen.iter().map(String::as_str));
+            let near = near.map_or_else(String::new, |name| format!("; did you mean `{name}`?"));
+            let _ = writeln!(
+                told,
+                "  nothing called `{object}` has been seen so far{near}"
+            );
         }
     }
     for (name, node) in there {
@@ -135,7 +142,7 @@ end = "11:30"
             "{told}"
         );
         assert!(told.contains("news: 10:15:00 to 11:00:00 at tv (as before)"));
-        assert!(told.contains("nothing called table has been seen so far"));
+        assert!(told.contains("nothing called `table` has been seen so far"));
         let (count, told) = put("");
         assert_eq!(count, 2);
         assert!(told.contains("news: no more"), "{told}");

@@ -4,7 +4,8 @@ use super::*;
 use crate::grid::{BLOCKED, FREE};
 use crate::social_mapping::map::SocialMapper;
 use crate::social_mapping::object_space::Outline;
-use crate::social_mapping::scene::{Activity, Manner, Object, Person, Rejection, SocialScene};
+use crate::social_mapping::rejection::Rejection;
+use crate::social_mapping::scene::{Activity, Manner, Object, Person, SocialScene};
 use dsr::Time;
 use nalgebra::{Isometry2, Point2, Vector2};
 use serde_json::Value;
@@ -92,6 +93,7 @@ fn scene() -> SocialScene {
         interactions: vec![("one".into(), "two".into())],
         objects: vec![object("board", 4.5), object("table", 1.0)],
         activities: vec![Activity {
+            name: "feast".into(),
             object: "board".into(),
             start,
             end: start + 60.0,

@@ -5,8 +5,9 @@ use super::ReadError;
 use crate::social_mapping::config::SocialConfig;
 use crate::social_mapping::features::Features;
 use crate::social_mapping::object_space::Outline;
+use crate::social_mapping::rejection::Rejection;
 use crate::social_mapping::scene::{
-    Activity, BODY_RADIUS, Manner, Object, Person, Rejection, SocialScene, Wall,
+    Activity, BODY_RADIUS, Manner, Object, Person, SocialScene, Wall,
 };
 use dsr::{Node, NodeId, Snapshot, Time, Value};
 use nalgebra::{Point2, Vector2};
@@ -249,9 +250,13 @@ fn read_activities(snapshot: &Snapshot, scene: &mut SocialScene) -> Result<(), R
         objects.sort_unstable();
         objects.dedup();
         let (start, end) = (Time::from_seconds(start), Time::from_seconds(end));
-        let activities = objects
-            .into_iter()
-            .map(|object| Activity { object, start, end });
+        let name = node.name()?;
+        let activities = objects.into_iter().map(|object| Activity {
+            name: name.clone(),
+            object,
+            start,
+            end,
+        });
         scene.activities.extend(activities);
     }
     Ok(())

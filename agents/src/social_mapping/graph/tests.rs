@@ -9,6 +9,7 @@ use nalgebra::{Isometry2, Vector2};
 use std::f64::consts::PI;
 
 mod people;
+mod problems;
 
 const NOON: f64 = 1_800_000_000.0;
 
@@ -58,6 +59,7 @@ rule = { kind = "string" }
 binding = { kind = "string" }
 cancelled = { kind = "bool" }
 social_settings = { kind = "string" }
+problems = { kind = "string" }
 "#;
 
 fn noon() -> Time {
@@ -279,7 +281,9 @@ fn a_graph_that_tells_too_little_is_an_error_that_says_what_is_missing() {
         spoil(&mut centre);
         agent()
             .step(noon(), &centre.0.snapshot())
-            .unwrap_err()
+            .unwrap()
+            .stopped
+            .unwrap()
             .to_string()
     };
     let gone = |name: &'static str| {

@@ -160,6 +160,7 @@ fn objects_claim_their_space_as_their_agenda_says() {
         .objects
         .push(object("plant", "plant", 9.0, 9.0, Outline::Circle(0.2)));
     scene.activities.push(Activity {
+        name: "therapy".into(),
         object: "table".into(),
         start: noon() + 3600.0,
         end: noon() + 5400.0,
@@ -281,15 +282,18 @@ fn bad_items_are_left_out_or_mended_and_always_reported() {
         ),
         object("plant", "plant", 2.0, 8.0, Outline::Circle(0.1)),
     ];
-    let activity = |object: &str, start, end| Activity {
+    let activity = |name: &str, object: &str, start, end| Activity {
+        name: name.into(),
         object: object.into(),
         start: noon() + start,
         end: noon() + end,
     };
     scene.activities = vec![
-        activity("plant", 0.0, 1.0),
-        activity("hole", 0.0, 1.0),
-        activity("plant", 1.0, 0.0),
+        activity("watering", "plant", 0.0, 1.0),
+        activity("digging", "hole", 0.0, 1.0),
+        activity("pruning", "plant", 1.0, 0.0),
+        activity("looking", "plant", 1.0, 1.0),
+        activity("potting", "plnat", 0.0, 1.0),
     ];
     let map = update(&scene);
     let reports: Vec<String> = map.rejected.iter().map(ToString::to_string).collect();
@@ -300,9 +304,11 @@ fn bad_items_are_left_out_or_mended_and_always_reported() {
         person voyager is ignored: the pose is no place within 1e8 m
         object hole is ignored: its pose is no place within 1e8 m, or its size none of up to 1000 m
         object flat is ignored: its pose is no place within 1e8 m, or its size none of up to 1000 m
-        an activity uses plant, which the map does not have or which has no space
-        an activity uses hole, which the map does not have or which has no space
-        an activity with plant is ignored: the activity ends at 1800000000.000 s, before it starts at 1800000001.000 s
+        activity pruning is ignored: it ends at 1800000000.000 s, before it starts at 1800000001.000 s
+        activity looking is ignored: it ends when it starts, at 1800000001.000 s
+        activity watering has no effect: plant is of the class plant, which has no space
+        activity digging waits: nothing called `hole` has been seen so far
+        activity potting waits: nothing called `plnat` has been seen so far; did you mean `plant`?
         ana and bo interact at 6.0 m: too far for a space between them
         ana and ghost interact, but nobody called ghost has a place"]]
     .assert_eq(&reports.join("\n"));

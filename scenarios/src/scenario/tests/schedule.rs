@@ -42,6 +42,8 @@ fn a_schedule_adds_to_the_activities_of_the_main_file() {
 
 #[test]
 fn what_is_wrong_with_a_schedule_is_told_with_its_own_file_and_lines() {
+    let invalid = with(&SCHEDULE.replace("16:00", "14:00")).expect_err("a bad schedule");
+    assert_eq!(told(&invalid), ["6: this activity ends when it starts"]);
     let spoilt = SCHEDULE
         .replace("\"screen\"", "\"sreen\"")
         .replace("\"match\"", "\"news\"")

@@ -2,6 +2,7 @@
 //! not given by default, and what cannot be.
 
 use super::*;
+use crate::scenario::parse_social;
 use agents::human_observer::Association;
 use agents::social_mapping::adaptation::WallAdaptation;
 use agents::social_mapping::groups::Method;
@@ -85,6 +86,24 @@ fn names_that_nothing_in_the_scenario_has_are_told_with_what_there_is() {
             "there is no object called `rond`",
         ]
     );
+    // The same in a file of its own.
+    let scenario = parse(TWO_ROOMS).unwrap();
+    let settings = "[social]\nactivity_in = { hal = \"coking\" }\nusage_of.rond.ramp = 60.0\n";
+    let read = |scenario| parse_social("settings.toml", settings, scenario).unwrap_err();
+    let lines: Vec<String> = read(Some(&scenario))
+        .problems
+        .iter()
+        .map(|problem| format!("{}: {}", problem.line, problem.kind))
+        .collect();
+    assert_eq!(
+        lines,
+        [
+            "2: there is no room called `hal`",
+            "2: activity_in.hal needs the name of an activity, and `coking` is none; did you mean `cooking`?",
+            "3: there is no object called `rond`",
+        ]
+    );
+    assert_eq!(read(None).problems.len(), 1);
     // A figure that cannot be is told where it stands.
     let text = format!("{TWO_ROOMS}\n[social]\nclearance_cost = 1.0\nresolution = 0\n");
     let invalid = parse(&text).unwrap_err();

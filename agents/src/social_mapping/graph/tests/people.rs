@@ -145,7 +145,8 @@ fn what_a_person_does_feels_and_is_wanted_for_comes_from_the_graph() {
         "{said:?}"
     );
     assert!(
-        said[1].starts_with("person ana: there is no activity `yodelling`; there are cooking"),
+        said[1]
+            .starts_with("person ana: there is no activity called `yodelling`; known are: cooking"),
         "{said:?}"
     );
 }

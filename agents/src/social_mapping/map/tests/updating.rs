@@ -90,6 +90,7 @@ prop_compose! {
             walls,
             interactions: interactions.iter().map(|(a, b)| (format!("p{a}"), format!("p{b}"))).collect(),
             activities: activities.iter().map(|(o, start, length)| Activity {
+                name: format!("with {o}"),
                 object: format!("o{o}"),
                 start: noon() + *start,
                 end: noon() + *start + *length,

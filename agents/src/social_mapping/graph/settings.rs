@@ -1,0 +1,75 @@
+//! The settings that somebody enters at the world while the system runs. This file guarantees that what cannot be
+//! used changes nothing: those that were in force stay in force until it is mended.
+
+use super::SETTINGS;
+use crate::social_mapping::config::SocialConfig;
+use crate::social_mapping::map::SocialMapper;
+use crate::social_mapping::rejection::Rejection;
+use dsr::{ReadError, Snapshot, Value};
+
+/// The type whose descendants are the classes of objects.
+const OBJECT: &str = "object";
+
+/// What was read last.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Settings {
+    text: Option<String>,
+    refused: Vec<Rejection>,
+    /// Whether they were refused for names, which the graph may have later.
+    for_names: bool,
+}
+
+impl Settings {
+    /// What is wrong with those that stand in the graph.
+    pub(super) fn refused(&self) -> &[Rejection] {
+        &self.refused
+    }
+
+    /// A mapper with the world's settings, where these changed and can be used.
+    pub(super) fn read(&mut self, snapshot: &Snapshot) -> Result<Option<SocialMapper>, ReadError> {
+        let Some(world) = snapshot.nodes_of("world").next().transpose()? else {
+            return Ok(None);
+        };
+        let value = world.value(SETTINGS)?;
+        let text = value.as_ref().and_then(Value::as_str);
+        if text == self.text.as_deref() && !self.for_names {
+            return Ok(None);
+        }
+        self.text = text.map(str::to_owned);
+        self.for_names = false;
+        let config = match serde_json::from_str::<SocialConfig>(text.unwrap_or("{}")) {
+            Ok(config) => config,
+            Err(error) => {
+                let problem = error.to_string();
+                self.refused = vec![Rejection::Settings { problem }];
+                return Ok(None);
+            }
+        };
+        let mut problems = config.problems();
+        if problems.is_empty() {
+            problems = config.unknown_names(&rooms(snapshot)?, classes(snapshot).as_deref());
+            self.for_names = !problems.is_empty();
+        }
+        let told = problems.iter().map(|problem| Rejection::Settings {
+            problem: format!("{} {}", problem.field, problem.requirement),
+        });
+        self.refused = told.collect();
+        Ok(if self.refused.is_empty() {
+            SocialMapper::new(config).ok()
+        } else {
+            None
+        })
+    }
+}
+
+fn rooms(snapshot: &Snapshot) -> Result<Vec<String>, ReadError> {
+    snapshot.nodes_of("room").map(|room| room?.name()).collect()
+}
+
+/// The classes of objects that there may be; `None` where the schema takes any.
+fn classes(snapshot: &Snapshot) -> Option<Vec<&str>> {
+    let schema = snapshot.schema();
+    let object = schema.find_type(OBJECT)?;
+    let all = schema.subtypes(object).iter();
+    (!schema.is_open()).then(|| all.map(|class| schema.type_name(*class)).collect())
+}

@@ -1,0 +1,116 @@
+//! What somebody entered wrongly while the system runs: where it is told, and what stays in force meanwhile.
+
+use super::*;
+
+/// What stands at a node; empty where nothing does.
+fn problems(centre: &Centre, node: &str) -> String {
+    let value = centre.value(node, PROBLEMS);
+    value.map_or_else(String::new, |value| value.as_str().unwrap().to_owned())
+}
+
+#[test]
+fn an_agenda_that_cannot_be_stands_at_the_activity_and_the_world_until_it_is_mended() {
+    let (mut centre, mut agent) = (Centre::new(), agent());
+    let mut now = noon();
+    let mut turn = |centre: &mut Centre| {
+        now = now + 1.0;
+        centre.turn(&mut agent, now).1
+    };
+    let times = [("start", (NOON + 9.0).into()), ("end", NOON.into())];
+    centre.add("activity", "news", None, &times);
+    centre.set("news", "object", "tabel");
+    turn(&mut centre);
+    let backward = "activity news is ignored: it ends at 1800000000.000 s, before it starts at 1800000009.000 s";
+    assert_eq!(problems(&centre, "news"), backward);
+    assert_eq!(problems(&centre, "world"), backward);
+    centre.set("news", "end", NOON + 60.0);
+    turn(&mut centre);
+    let waits =
+        "activity news waits: nothing called `tabel` has been seen so far; did you mean `table`?";
+    assert_eq!(problems(&centre, "news"), waits);
+    // Nothing is written again while nothing changes.
+    assert_eq!(turn(&mut centre), [""; 0]);
+    centre.set("ana", "activity", "coking");
+    turn(&mut centre);
+    let activity = "person ana: there is no activity called `coking`; did you mean `cooking`?";
+    assert_eq!(problems(&centre, "ana"), activity);
+    assert_eq!(problems(&centre, "world"), format!("{waits}\n{activity}"));
+    centre.set("ana", "activity", "cooking");
+    centre.set("news", "object", "table");
+    turn(&mut centre);
+    for node in ["news", "ana", "world"] {
+        assert_eq!(problems(&centre, node), "");
+    }
+}
+
+#[test]
+fn settings_that_cannot_be_used_leave_those_before_in_force_and_are_told_at_the_world() {
+    let (mut centre, mut agent) = (Centre::new(), agent());
+    let mut now = noon();
+    let mut turn = |centre: &mut Centre| {
+        now = now + 1.0;
+        centre.turn(&mut agent, now);
+        problems(centre, "world")
+    };
+    centre.add("room", "kitchen", None, &[]);
+    let settings = |more: &str| format!("{{\"usage\": {{\"least\": 2.0}}{more}}}");
+    centre.set("world", SETTINGS, settings(""));
+    assert_eq!(turn(&mut centre), "");
+    assert_eq!(centre.value("table", "usage"), Some(2.0.into()));
+    for (wrong, says) in [
+        (
+            r#"{"activity_in": {"kichen": "cooking"}}"#,
+            "activity_in needs names of rooms, and `kichen` is none; did you mean `kitchen`?",
+        ),
+        (
+            r#"{"activity_in": {"kitchen": "coking"}}"#,
+            "activity_in.kitchen needs the name of an activity, and `coking` is none; did you mean `cooking`?",
+        ),
+        (
+            r#"{"spaces": {"tabel": {"margin": 0.5}}}"#,
+            "spaces needs classes of objects, and `tabel` is none; did you mean `table`?",
+        ),
+        (
+            r#"{"features": {"known": {"role": {"levels": {"guest": 2.0}}}}}"#,
+            "features.known.role.levels.guest must be above 0 and at most 1",
+        ),
+    ] {
+        centre.set("world", SETTINGS, wrong);
+        let told = turn(&mut centre);
+        assert_eq!(
+            told,
+            format!("the social settings of the world are not used: {says}")
+        );
+        assert_eq!(centre.value("table", "usage"), Some(2.0.into()), "{wrong}");
+    }
+    // A room that comes later makes them right.
+    centre.set("world", SETTINGS, r#"{"activity_in": {"hall": "running"}}"#);
+    assert!(turn(&mut centre).contains("`hall` is none"));
+    centre.add("room", "hall", None, &[]);
+    assert_eq!(turn(&mut centre), "");
+    assert_eq!(centre.value("table", "usage"), Some(1.5.into()));
+    // An object may not have been seen yet: the rest counts.
+    let waiting = settings(r#", "usage_of": {"tabel": {"ramp": 60.0}}"#);
+    centre.set("world", SETTINGS, waiting);
+    assert_eq!(
+        turn(&mut centre),
+        "`usage_of` waits: nothing called `tabel` has been seen so far; did you mean `table`?"
+    );
+    assert_eq!(centre.value("table", "usage"), Some(2.0.into()));
+}
+
+#[test]
+fn why_there_is_no_map_stands_at_the_world() {
+    let (mut centre, mut agent) = (Centre::new(), agent());
+    centre.set("robot", "radius", f64::NAN);
+    let (turn, written) = centre.turn(&mut agent, noon());
+    assert!(turn.stopped.is_some() && turn.grid.is_none());
+    assert_eq!(written, ["world.problems"]);
+    assert_eq!(
+        problems(&centre, "world"),
+        "there is no new map: the robot's radius is NaN m, where it may be from 0 m to 10 m"
+    );
+    centre.set("robot", "radius", 0.25);
+    assert!(centre.turn(&mut agent, noon()).0.grid.is_some());
+    assert_eq!(problems(&centre, "world"), "");
+}
