@@ -2,13 +2,14 @@
 //! owns what the outcome says; it guarantees that each step of a plan is applicable after those
 //! before it, and that the goal holds at the end.
 
+mod lifted;
 mod narrow;
 mod reason;
 
 use crate::ground::{
     Environment, Ground, Instance, Operator, Problem, ProblemError, Reached, Scope, build,
 };
-use crate::search::{Answer, Effort, Limits, Reachability, search};
+use crate::search::{Answer, Effort, Limits, Reachability, StopReason, search};
 use crate::task::{Micro, from_micro};
 use dsr::{ReadError, Snapshot};
 use grammar::{Goal, Grammar};
@@ -152,6 +153,21 @@ pub fn plan(
     options: &Options,
     limits: &mut Limits<'_>,
 ) -> Result<Outcome, ReadError> {
+    plan_above(MANY_ACTIONS, grammar, snapshot, goal, options, limits)
+}
+
+/// More ground actions than this are not made before few of them were tried.
+const MANY_ACTIONS: usize = 100_000;
+
+/// Plans, with so many ground actions as are made before other ways are tried.
+pub(crate) fn plan_above(
+    many: usize,
+    grammar: &Grammar,
+    snapshot: &Snapshot,
+    goal: &Goal,
+    options: &Options,
+    limits: &mut Limits<'_>,
+) -> Result<Outcome, ReadError> {
     let mut options = options.clone();
     options.awake.extend(grammar.awake(snapshot)?);
     let options = &options;
@@ -170,7 +186,13 @@ pub fn plan(
             spares,
             ..options.clone()
         };
-        let outcome = solve(&problem, &few, limits);
+        let asked = Asked {
+            problem: &problem,
+            options: &few,
+            awake: &problem.awake(&few.awake),
+            many,
+        };
+        let outcome = solve(asked, limits);
         if outcome.status == Status::Unsolvable && spares > 0 && !tried {
             tried = true;
             // As many new nodes as any rule can tell apart: more of them are more of the same.
@@ -209,69 +231,76 @@ pub fn plan(
 /// could be made costs nothing until it is needed.
 const FEW_SPARES: usize = 2;
 
-/// Plans for a problem that was read.
-fn solve(problem: &Problem, options: &Options, limits: &mut Limits<'_>) -> Outcome {
-    let awake = problem.awake(&options.awake);
+/// A problem that was read, and how it shall be solved.
+#[derive(Debug, Clone, Copy)]
+struct Asked<'a> {
+    problem: &'a Problem,
+    options: &'a Options,
+    /// Which rules are awake at first.
+    awake: &'a [bool],
+    /// So many ground actions are made before other ways are tried.
+    many: usize,
+}
+
+fn solve(asked: Asked<'_>, limits: &mut Limits<'_>) -> Outcome {
+    let Asked { problem, awake, .. } = asked;
     // A plan of least cost may need any of the actions.
-    let most = match options.effort {
+    let most = match asked.options.effort {
         Effort::Optimal => usize::MAX,
-        Effort::First | Effort::Anytime => MANY_ACTIONS,
+        Effort::First | Effort::Anytime => asked.many,
     };
     let stopped = |stop, limits: &Limits<'_>| {
         let reason = format!("stopped while grounding: {stop}");
         Outcome::without_plan(Status::Limit, reason, limits.expanded())
     };
-    let mut reached = match problem.reach(&awake, Scope::All(most), limits) {
-        Ok(reached) => reached,
+    match problem.reach(awake, Scope::All(most), limits) {
+        Ok(reached) if !reached.overflow => return search_in(asked, &reached, limits),
+        Ok(_) => {}
         Err(stop) => return stopped(stop, limits),
-    };
-    if reached.overflow {
-        drop(reached);
-        match narrow::plan(problem, options, &awake, limits) {
-            Ok(Some(outcome)) => return outcome,
-            Ok(None) => {}
-            Err(stop) => return stopped(stop, limits),
-        }
-        reached = match problem.reach(&awake, Scope::All(usize::MAX), limits) {
-            Ok(reached) => reached,
-            Err(stop) => return stopped(stop, limits),
-        };
     }
-    search_in(problem, options, &awake, &reached, limits)
+    match narrow::plan(asked, limits) {
+        Ok(Some(outcome)) => return outcome,
+        Ok(None) => {}
+        Err(stop) => return stopped(stop, limits),
+    }
+    limits.cap(LIFTED_FIRST);
+    let outcome = lifted::plan(asked, limits);
+    limits.uncap();
+    if let Ok(outcome) = outcome {
+        return outcome;
+    }
+    match problem.reach(awake, Scope::All(MOST_ACTIONS), limits) {
+        Ok(reached) if !reached.overflow => search_in(asked, &reached, limits),
+        Ok(_) | Err(StopReason::Memory) => {
+            lifted::plan(asked, limits).unwrap_or_else(|outcome| outcome)
+        }
+        Err(stop) => stopped(stop, limits),
+    }
 }
 
-/// More ground actions than this are not made before few of them were tried.
-const MANY_ACTIONS: usize = 100_000;
+/// So many states are expanded without ground actions before all of these are made.
+const LIFTED_FIRST: u64 = 20_000;
+
+/// More ground actions than this are not made at all, but to prove a plan to be the best.
+const MOST_ACTIONS: usize = 1_000_000;
 
 /// Searches among what was reached.
-fn search_in(
-    problem: &Problem,
-    options: &Options,
-    awake: &[bool],
-    reached: &Reached,
-    limits: &mut Limits<'_>,
-) -> Outcome {
-    let ground = ground(problem, options, awake, reached);
+fn search_in(asked: Asked<'_>, reached: &Reached, limits: &mut Limits<'_>) -> Outcome {
+    let Asked {
+        problem, options, ..
+    } = asked;
+    let ground = ground(problem, options, asked.awake, reached);
     match search(&ground.task, options.effort, limits) {
         Answer::Solved {
             actions,
             optimal,
             cost,
         } => {
-            let steps = actions
-                .iter()
-                .map(|&action| step(problem, reached, &ground, action))
-                .collect();
-            Outcome {
-                status: Status::Solved,
-                optimal: optimal
-                    && !reached.truncated
-                    && spares_suffice(problem, options, reached, &ground, cost),
-                cost: Some(from_micro(plain_cost(&ground, &actions))),
-                steps,
-                expanded: limits.expanded(),
-                reason: None,
-            }
+            let optimal = optimal
+                && !reached.truncated
+                && spares_suffice(problem, options, reached, &ground, cost);
+            let expanded = limits.expanded();
+            solved(problem, reached, &ground, &actions, optimal, expanded)
         }
         Answer::Unsolvable => {
             let spares = Some(options.spares);
@@ -287,19 +316,44 @@ fn search_in(
     }
 }
 
+/// The outcome that some actions are.
+fn solved(
+    problem: &Problem,
+    reached: &Reached,
+    ground: &Ground,
+    actions: &[usize],
+    optimal: bool,
+    expanded: u64,
+) -> Outcome {
+    let steps = actions.iter();
+    Outcome {
+        status: Status::Solved,
+        optimal,
+        cost: Some(from_micro(plain_cost(ground, actions))),
+        steps: steps
+            .map(|&action| step(problem, reached, ground, action))
+            .collect(),
+        expanded,
+        reason: None,
+    }
+}
+
+/// What the options say of steps that are dearer than their rules say, or excluded.
+fn raised(problem: &Problem, options: &Options) -> Vec<(usize, Environment, f64)> {
+    let all = options.raised.iter();
+    all.filter_map(|raised| {
+        let operator = problem.operator(&raised.rule)?;
+        let binding = raised.binding.iter();
+        let binding = binding.map(|(v, n)| (v.as_str(), n.as_str()));
+        let environment = problem.environment(operator, binding)?;
+        Some((operator, environment, raised.by))
+    })
+    .collect()
+}
+
 /// The ground task, in which some steps are dearer than their rules say.
 fn ground(problem: &Problem, options: &Options, awake: &[bool], reached: &Reached) -> Ground {
-    let raised: Vec<(usize, Environment, f64)> = options
-        .raised
-        .iter()
-        .filter_map(|raised| {
-            let operator = problem.operator(&raised.rule)?;
-            let binding = raised.binding.iter();
-            let binding = binding.map(|(v, n)| (v.as_str(), n.as_str()));
-            let environment = problem.environment(operator, binding)?;
-            Some((operator, environment, raised.by))
-        })
-        .collect();
+    let raised = raised(problem, options);
     let extra = |instance: &Instance| -> f64 {
         let bound = problem.program.operators[instance.operator].bound;
         let same = raised.iter().filter(|(operator, environment, _)| {

@@ -7,9 +7,10 @@ mod conditions;
 use super::effects::{Guard, Primitive, each_primitive};
 use conditions::negation;
 
+use super::choices::combinations;
 use super::facts::Facts;
 use super::program::{Link, Object, Operator, Place, Program};
-use super::reach::{Instance, Reached, combinations};
+use super::reach::{Instance, Reached};
 use super::value::{amount, evaluate};
 use crate::task::{Action, Effect, Fact, Formula, Micro, Task, keep, micro, relevant};
 use rustc_hash::{FxHashMap, FxHashSet};

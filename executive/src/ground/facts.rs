@@ -5,12 +5,14 @@
 use super::program::{Link, Object, Place};
 use super::vocabulary::TypeSet;
 use dsr::Value;
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashMap;
+use std::collections::hash_map::Entry::Vacant;
 
 /// Links, types and values.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Facts {
-    links: FxHashSet<Link>,
+    /// Where each link is in `pairs`.
+    links: FxHashMap<Link, u32>,
     out: FxHashMap<(u16, Object), Vec<Object>>,
     into: FxHashMap<(u16, Object), Vec<Object>>,
     pairs: Vec<Vec<(Object, Object)>>,
@@ -44,32 +46,43 @@ impl Facts {
         self.types.len() as Object - 1
     }
 
+    /// How many objects there may be, those that do not exist counted in.
+    pub(crate) fn objects(&self) -> usize {
+        self.types.len()
+    }
+
     pub(crate) fn has_link(&self, link: Link) -> bool {
-        self.links.contains(&link)
+        self.links.contains_key(&link)
     }
 
     pub(crate) fn add_link(&mut self, link: Link) -> bool {
-        let new = self.links.insert(link);
-        if new {
-            let Link { label, from, to } = link;
-            self.out.entry((label, from)).or_default().push(to);
-            self.into.entry((label, to)).or_default().push(from);
-            self.pairs[usize::from(label)].push((from, to));
-        }
-        new
+        let Vacant(entry) = self.links.entry(link) else {
+            return false;
+        };
+        let Link { label, from, to } = link;
+        let pairs = &mut self.pairs[usize::from(label)];
+        entry.insert(pairs.len() as u32);
+        pairs.push((from, to));
+        self.out.entry((label, from)).or_default().push(to);
+        self.into.entry((label, to)).or_default().push(from);
+        true
     }
 
-    #[cfg(test)]
     pub(crate) fn remove_link(&mut self, link: Link) {
-        if self.links.remove(&link) {
-            let Link { label, from, to } = link;
-            if let Some(targets) = self.out.get_mut(&(label, from)) {
-                targets.retain(|&other| other != to);
-            }
-            if let Some(sources) = self.into.get_mut(&(label, to)) {
-                sources.retain(|&other| other != from);
-            }
-            self.pairs[usize::from(label)].retain(|&pair| pair != (from, to));
+        let Some(place) = self.links.remove(&link) else {
+            return;
+        };
+        let Link { label, from, to } = link;
+        let pairs = &mut self.pairs[usize::from(label)];
+        pairs.swap_remove(place as usize);
+        if let Some(&(from, to)) = pairs.get(place as usize) {
+            self.links.insert(Link { label, from, to }, place);
+        }
+        if let Some(targets) = self.out.get_mut(&(label, from)) {
+            targets.retain(|&other| other != to);
+        }
+        if let Some(sources) = self.into.get_mut(&(label, to)) {
+            sources.retain(|&other| other != from);
         }
     }
 
@@ -123,12 +136,10 @@ impl Facts {
         new
     }
 
-    /// Makes an object not exist, but leaves its links.
-    #[cfg(test)]
-    pub(crate) fn remove_types(&mut self, object: Object) {
-        for exact in std::mem::take(&mut self.types[object as usize]) {
-            self.of_type[usize::from(exact)].retain(|&other| other != object);
-        }
+    /// Makes an object not be of an exact type, but leaves its links.
+    pub(crate) fn remove_type(&mut self, object: Object, exact: u16) {
+        self.types[object as usize].retain(|&other| other != exact);
+        self.of_type[usize::from(exact)].retain(|&other| other != object);
     }
 
     /// Whether an object may be of one of `types`.

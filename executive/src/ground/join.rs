@@ -78,6 +78,7 @@ pub(crate) const fn bytes_of_binding(slots: usize) -> usize {
 pub(crate) struct Plan {
     by_link: Vec<Vec<Step>>,
     by_variable: Vec<Vec<Step>>,
+    all: Vec<Step>,
 }
 
 impl Plan {
@@ -92,6 +93,18 @@ impl Plan {
                 .map(|(index, link)| order(&[link.from as usize, link.to as usize], Some(index)))
                 .collect(),
             by_variable: (0..operator.bound).map(|v| order(&[v], None)).collect(),
+            all: order(&[], None),
+        }
+    }
+
+    /// All bindings.
+    pub(crate) fn all(&self, operator: &Operator, facts: &Facts, found: &mut Found<'_, '_>) {
+        let mut environment = operator.environment();
+        let is_of = |&(slot, object): &(usize, Object)| {
+            facts.is_of(object, &operator.variables[slot].types)
+        };
+        if operator.fixed.iter().all(is_of) {
+            extend(operator, facts, &self.all, &mut environment, found);
         }
     }
 

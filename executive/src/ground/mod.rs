@@ -3,6 +3,7 @@
 //! rules, as long as no rule is applied more often than it has spare objects for what it creates.
 
 mod build;
+mod choices;
 mod compile;
 mod effects;
 mod explain;
@@ -10,7 +11,6 @@ mod facts;
 mod join;
 mod program;
 mod reach;
-#[cfg(test)]
 mod simulate;
 mod truth;
 mod value;
@@ -19,8 +19,13 @@ mod words;
 mod world;
 
 pub(crate) use build::{Atom, Ground, build};
+pub(crate) use facts::Facts;
+pub(crate) use join::{Found, Plan as Join};
 pub(crate) use program::{Environment, Link, Object, Operator, Place, UNBOUND, Variable};
 pub(crate) use reach::{Arrival, Instance, Reached, Scope, reach};
+pub(crate) use simulate::{changes, is_admitted};
+pub(crate) use truth::lacking;
+pub(crate) use value::{amount, evaluate};
 
 use crate::search::{Limits, StopReason};
 use dsr::{ReadError, Snapshot};
@@ -116,6 +121,15 @@ impl Problem {
             .collect()
     }
 
+    /// The objects for what an operator creates when it takes a spare; nothing for one that creates nothing, and
+    /// `None` where there are not so many spares.
+    pub(crate) fn spare(&self, operator: usize, spare: usize) -> Option<&[Object]> {
+        if !self.program.operators[operator].creates() {
+            return Some(&[]);
+        }
+        self.spares[operator].get(spare).map(Vec::as_slice)
+    }
+
     /// What may come to hold.
     pub(crate) fn reach(
         &self,
@@ -123,10 +137,21 @@ impl Problem {
         scope: Scope,
         limits: &mut Limits<'_>,
     ) -> Result<Reached, StopReason> {
+        self.reach_from(&self.world.facts, awake, scope, limits)
+    }
+
+    /// What may come to hold from other facts.
+    pub(crate) fn reach_from(
+        &self,
+        facts: &Facts,
+        awake: &[bool],
+        scope: Scope,
+        limits: &mut Limits<'_>,
+    ) -> Result<Reached, StopReason> {
         reach(
             &self.program,
             &self.goal,
-            &self.world,
+            facts,
             &self.spares,
             awake.to_vec(),
             scope,
@@ -166,6 +191,21 @@ impl Problem {
             self.name(link.from),
             self.name(link.to)
         ))
+    }
+
+    /// What of the goal does not hold at a binding, in words.
+    pub(crate) fn missing(&self, facts: &Facts, environment: &Environment) -> Vec<String> {
+        let (goal, words) = (&self.goal, self.words());
+        let links = goal.links.iter();
+        let links = links.filter(|link| !facts.has_link(link.at(environment)));
+        let links = links.map(|&link| words.link(link, goal, environment));
+        let absent = goal.absent.iter();
+        let absent = absent.filter(|link| facts.has_link(link.at(environment)));
+        let absent = absent.map(|&link| format!("without {}", words.link(link, goal, environment)));
+        let tests = goal.tests.iter();
+        let tests = tests.filter(|test| !truth::holds(test, facts, &mut environment.clone()));
+        let tests = tests.map(|test| words.test(test, goal, environment));
+        links.chain(absent).chain(tests).collect()
     }
 
     /// The operator of a rule.

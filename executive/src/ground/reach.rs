@@ -2,6 +2,7 @@
 //! guarantees that every plan uses only instances and facts found here, as long as it makes no more
 //! new nodes per rule than there are spare objects.
 
+use super::choices::combinations;
 use super::effects::{Guard, Primitive, each_primitive};
 use super::facts::Facts;
 use super::join::{Found, Plan, bytes_of_binding};
@@ -9,10 +10,7 @@ use super::program::{
     Change, Environment, Link, Object, Operator, Place, Program, Quantified, Term,
 };
 use super::truth::always;
-use super::value::evaluate;
-use super::world::World;
 use crate::search::{Limits, StopReason};
-use dsr::Value;
 use fixedbitset::FixedBitSet;
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::VecDeque;
@@ -40,6 +38,8 @@ pub(crate) enum Scope {
     At(FixedBitSet, usize),
     /// Until the goal may hold, with only those instances that first brought about something.
     Way,
+    /// What these instances bring about, and no others.
+    Steps(Vec<Instance>),
 }
 
 /// What may come to hold.
@@ -109,7 +109,7 @@ struct Reaching<'a> {
 pub(crate) fn reach(
     program: &Program,
     goal: &Operator,
-    world: &World,
+    initial: &Facts,
     spares: &[Vec<Vec<Object>>],
     awake: Vec<bool>,
     scope: Scope,
@@ -117,8 +117,7 @@ pub(crate) fn reach(
 ) -> Result<Reached, StopReason> {
     let labels = program.vocabulary.labels.len();
     let types = program.vocabulary.types.len();
-    let objects = world.nodes.len();
-    let mut facts = world.facts.clone();
+    let mut facts = initial.clone();
     facts.forget_structure();
     let mut by_label = vec![Vec::new(); labels];
     let mut by_type = vec![Vec::new(); types];
@@ -136,7 +135,7 @@ pub(crate) fn reach(
     let changes = program.operators.iter().map(|operator| &operator.changes);
     let gains: Vec<Vec<Change>> = changes.map(|all| gains(all, program)).collect();
     let mut reaching = Reaching {
-        plans: operators().map(|o| Plan::new(o, &world.facts)).collect(),
+        plans: operators().map(|o| Plan::new(o, initial)).collect(),
         sleeping: vec![Vec::new(); program.operators.len()],
         seen: FxHashSet::default(),
         open_ended: gains.iter().map(|gains| open_ended(gains)).collect(),
@@ -144,7 +143,7 @@ pub(crate) fn reach(
         arrivals: VecDeque::new(),
         scope,
         bytes: 0,
-        initial: &world.facts,
+        initial,
         program,
         goal,
         spares,
@@ -161,13 +160,13 @@ pub(crate) fn reach(
         },
     };
     // Types first: until links are there, few bindings have all that they need.
-    for object in 0..objects as Object {
-        for &exact in world.facts.types(object) {
+    for object in 0..initial.objects() as Object {
+        for &exact in initial.types(object) {
             reaching.arrivals.push_back(Arrival::Type(object, exact));
         }
     }
     for label in 0..labels as u16 {
-        for &(from, to) in world.facts.pairs(label) {
+        for &(from, to) in initial.pairs(label) {
             let link = Link { label, from, to };
             reaching.arrivals.push_back(Arrival::Link(link));
         }
@@ -217,7 +216,10 @@ impl<'a> Reaching<'a> {
 
     fn run(&mut self, limits: &mut Limits<'_>) -> Result<(), StopReason> {
         for number in 0..=self.program.operators.len() {
-            if self.operator(number).bound == 0 {
+            let is_rule = number < self.program.operators.len();
+            if self.operator(number).bound == 0
+                && !(is_rule && matches!(self.scope, Scope::Steps(_)))
+            {
                 let environment = self.operator(number).environment();
                 self.bound(number, vec![environment]);
             }
@@ -227,6 +229,15 @@ impl<'a> Reaching<'a> {
                 self.arrive(arrival, limits)?;
                 if self.is_enough() {
                     return Ok(());
+                }
+            }
+            if let Scope::Steps(steps) = &mut self.scope {
+                for instance in std::mem::take(steps) {
+                    self.effects(&instance);
+                    for &woken in &self.operator(instance.operator).wakes {
+                        self.reached.awake[woken] = true;
+                    }
+                    self.reached.instances.push(instance);
                 }
             }
             // Effects on every object of a type, and assigned values, depend on what was reached
@@ -251,6 +262,7 @@ impl<'a> Reaching<'a> {
                 self.reached.overflow
             }
             Scope::Way => !self.reached.goals.is_empty(),
+            Scope::Steps(_) => false,
         }
     }
 
@@ -267,10 +279,14 @@ impl<'a> Reaching<'a> {
         };
         for (number, index) in waiting.unwrap_or_default() {
             limits.check(self.bytes)?;
+            let is_rule = number < self.program.operators.len();
+            if is_rule && matches!(self.scope, Scope::Steps(_)) {
+                continue;
+            }
             let operator = self.operator(number);
             let (plan, facts) = (&self.plans[number], &self.reached.facts);
             let only = match &self.scope {
-                Scope::At(objects, _) if number < self.program.operators.len() => Some(objects),
+                Scope::At(objects, _) if is_rule => Some(objects),
                 _ => None,
             };
             if only.is_some_and(|objects| !arrival.is_among(objects)) {
@@ -430,66 +446,4 @@ impl<'a> Reaching<'a> {
         }
         grew
     }
-}
-
-/// A choice of one value (by its number) for each of some places.
-pub(crate) type Choice = Vec<(Place, usize)>;
-
-/// Every choice of values for the places of `term` that rules assign, and the term's value then.
-pub(crate) fn combinations(
-    term: &Term,
-    environment: &[Object],
-    facts: &Facts,
-    program: &Program,
-) -> Vec<(Choice, Option<Value>)> {
-    let terms = [term];
-    let choices = choices(&terms, environment, facts, program);
-    choices
-        .into_iter()
-        .map(|choice| {
-            let value = evaluate(term, &mut |place| {
-                read(place.at(environment), &choice, facts)
-            });
-            (choice, value)
-        })
-        .collect()
-}
-
-/// Every choice of values for the places of some terms that rules assign.
-pub(crate) fn choices(
-    terms: &[&Term],
-    environment: &[Object],
-    facts: &Facts,
-    program: &Program,
-) -> Vec<Choice> {
-    let mut places: Vec<Place> = Vec::new();
-    for term in terms {
-        term.each_place(&mut |place| {
-            let place = place.at(environment);
-            if program.assigned[usize::from(place.attribute())] && !places.contains(&place) {
-                places.push(place);
-            }
-        });
-    }
-    let mut all = vec![Choice::new()];
-    for place in places {
-        all = all
-            .iter()
-            .flat_map(|choice| {
-                (0..facts.values(place).len()).map(move |value| {
-                    let mut longer = choice.clone();
-                    longer.push((place, value));
-                    longer
-                })
-            })
-            .collect();
-    }
-    all
-}
-
-/// The value of a place, by a choice or else the only one.
-pub(crate) fn read(place: Place, choice: &Choice, facts: &Facts) -> Option<Value> {
-    let chosen = choice.iter().find(|(known, _)| *known == place);
-    let index = chosen.map_or(0, |(_, index)| *index);
-    facts.values(place).get(index).cloned().flatten()
 }

@@ -2,7 +2,7 @@
 //! application, on random grammars and graphs; and the simulator against the store.
 
 use super::simulate;
-use crate::plan::{Options, Status};
+use crate::plan::{Options, Status, plan_above};
 use crate::search::{Effort, Limits};
 use crate::testing::goal;
 use dsr::{Graph, NodeId, Schema, Time, Transaction, Value};
@@ -281,12 +281,14 @@ proptest! {
         let Ok(least) = brute_force(&grammar, &start, &wanted) else {
             return Err(TestCaseError::reject("too many states"));
         };
-        let mut graph = start.graph(&grammar);
+        let graph = start.graph(&grammar);
         let snapshot = graph.snapshot();
-        for effort in [Effort::First, Effort::Anytime, Effort::Optimal] {
+        // As ever, and as where there are too many actions to make any.
+        let efforts = [(1000, Effort::First), (1000, Effort::Anytime), (1000, Effort::Optimal), (0, Effort::First)];
+        for (many, effort) in efforts {
             let options = Options { effort, ..Options::default() };
             let limits = &mut Limits::new().with_expansions(100_000);
-            let outcome = crate::plan(&grammar, &snapshot, &wanted, &options, limits).unwrap();
+            let outcome = plan_above(many, &grammar, &snapshot, &wanted, &options, limits).unwrap();
             let expected = if least.is_some() { Status::Solved } else { Status::Unsolvable };
             prop_assert_eq!(outcome.status, expected, "{:?}", outcome);
             if outcome.optimal {
@@ -295,11 +297,15 @@ proptest! {
                 prop_assert!(effort == Effort::First || least.is_none());
             }
         }
-        // The store carries the plan out and the goal holds.
-        if least.is_some() {
+        // The store carries the plans out and the goal holds.
+        for many in [1000, 0] {
+            if least.is_none() {
+                break;
+            }
+            let mut graph = start.graph(&grammar);
             let limits = &mut Limits::new();
-            let options = Options::default();
-            let outcome = crate::plan(&grammar, &snapshot, &wanted, &options, limits).unwrap();
+            let (snapshot, options) = (graph.snapshot(), Options::default());
+            let outcome = plan_above(many, &grammar, &snapshot, &wanted, &options, limits).unwrap();
             for step in outcome.steps {
                 let mut transaction = Transaction::new();
                 let binding = step.binding.into_iter().map(|(v, n)| (v, n.into()));
@@ -337,7 +343,7 @@ proptest! {
                     .map(|(node, &o)| (node.variable.clone(), problem.world.nodes[o as usize]))
                     .collect();
                 let stored = grammar.obstacle(&snapshot, rule, &binding).unwrap();
-                let foreseen = simulate::obstacle(
+                let foreseen = simulate::testing::obstacle(
                     &problem.program.operators[operator],
                     &mut environment,
                     &problem.world.facts,
@@ -347,19 +353,31 @@ proptest! {
                     continue;
                 }
                 prop_assert_eq!(stored.is_some(), foreseen.is_some(), "{:?} {:?}", stored, foreseen);
+                let mut facts = problem.world.facts.clone();
+                let operator = &problem.program.operators[operator];
+                for created in &mut environment[operator.bound..operator.variables.len()] {
+                    *created = facts.add_object();
+                }
+                let changes =
+                    simulate::changes(&problem.program, operator, &mut environment, &facts);
                 let mut after = start.graph(&grammar);
                 let mut transaction = Transaction::new();
                 transaction.apply_rule(&rule.name, binding.to_refs());
-                if after.commit(&transaction, "test", Time::default()).is_err() {
-                    continue;
+                let taken = after.commit(&transaction, "test", Time::default()).is_ok();
+                if stored.is_none() {
+                    prop_assert_eq!(taken, changes.is_some());
                 }
+                let (true, Some(changes)) = (taken, changes) else {
+                    continue;
+                };
                 let after = State::of(&after);
-                let mut facts = problem.world.facts.clone();
-                let operator = &problem.program.operators[operator];
-                simulate::apply(&problem.program, operator, &mut environment, &mut facts);
+                simulate::testing::apply(&changes, &mut facts);
                 let mut links = Vec::new();
                 for (label, name) in problem.program.vocabulary.labels.iter() {
                     for &(from, to) in facts.pairs(label) {
+                        if [from, to].iter().any(|end| !nodes.contains(end)) {
+                            continue;
+                        }
                         let ends = [from, to].map(|o| problem.name(o).to_owned());
                         let [from, to] = ends;
                         links.push((from, name.to_owned(), to));

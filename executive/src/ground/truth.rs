@@ -3,7 +3,7 @@
 
 use super::effects::each_choice;
 use super::facts::Facts;
-use super::program::{Environment, Program, Test};
+use super::program::{Environment, Operator, Program, Test};
 use super::value::{compare, evaluate};
 
 /// Whether a condition holds in the state that `facts` is.
@@ -35,6 +35,44 @@ pub(crate) fn holds(test: &Test, facts: &Facts, environment: &mut Environment) -
             });
             all
         }
+    }
+}
+
+/// How much of what a goal asks for does not hold at a binding, counted in types, links and tests: 0 where it holds.
+pub(crate) fn lacking(goal: &Operator, facts: &Facts, environment: &mut Environment) -> u64 {
+    let variables = goal.variables[..goal.bound].iter().zip(&*environment);
+    let types = variables.filter(|(variable, object)| !facts.is_of(**object, &variable.types));
+    let links = goal.links.iter();
+    let links = links.filter(|link| !facts.has_link(link.at(environment)));
+    let absent = goal.absent.iter();
+    let absent = absent.filter(|link| facts.has_link(link.at(environment)));
+    let structure = (types.count() + links.count() + absent.count()) as u64;
+    let tests = goal.tests.iter();
+    structure
+        + tests
+            .map(|test| lacking_of(test, facts, environment))
+            .sum::<u64>()
+}
+
+fn lacking_of(test: &Test, facts: &Facts, environment: &mut Environment) -> u64 {
+    match test {
+        Test::All(parts) => {
+            let parts = parts.iter();
+            parts.map(|part| lacking_of(part, facts, environment)).sum()
+        }
+        Test::Any(parts) => {
+            let parts = parts.iter();
+            let least = parts.map(|part| lacking_of(part, facts, environment)).min();
+            least.unwrap_or(1)
+        }
+        Test::Forall(quantified) => {
+            let mut lacking = 0;
+            each_choice(quantified, facts, environment, &mut |environment, _| {
+                lacking += lacking_of(&quantified.body, facts, environment);
+            });
+            lacking
+        }
+        _ => u64::from(!holds(test, facts, environment)),
     }
 }
 

@@ -3,10 +3,11 @@
 //! nodes of that way, then also on their neighbours. This file guarantees that what it gives is a plan
 //! of the rules; it never says that there is none unless even that way does not exist.
 
-use super::{MANY_ACTIONS, Options, Outcome, Status, ground, reason, search_in};
-use crate::ground::{Arrival, Link, Object, Problem, Reached, Scope};
+use super::{Asked, Outcome, Status, ground, reason, search_in};
+use crate::ground::{Arrival, Atom, Facts, Link, Object, Problem, Reached, Scope};
 use crate::search::{Limits, StopReason};
 use fixedbitset::FixedBitSet;
+use rustc_hash::FxHashSet;
 
 /// How many links from the way's nodes others are counted in.
 const FARTHEST: usize = 3;
@@ -16,11 +17,15 @@ const FARTHEST: usize = 3;
 /// # Errors
 /// The limit that was met on the way.
 pub(super) fn plan(
-    problem: &Problem,
-    options: &Options,
-    awake: &[bool],
+    asked: Asked<'_>,
     limits: &mut Limits<'_>,
 ) -> Result<Option<Outcome>, StopReason> {
+    let Asked {
+        problem,
+        options,
+        awake,
+        many,
+    } = asked;
     let way = problem.reach(awake, Scope::Way, limits)?;
     if way.goals.is_empty() {
         if way.truncated {
@@ -32,15 +37,14 @@ pub(super) fn plan(
         let outcome = Outcome::without_plan(Status::Unsolvable, reason, expanded);
         return Ok(Some(outcome));
     }
-    let mut objects = on_the_way(problem, &way);
+    let Relaxed { mut objects, .. } = Relaxed::of(problem, &way, &problem.world.facts);
     drop(way);
     for _ in 0..=FARTHEST {
-        let scope = Scope::At(objects.clone(), MANY_ACTIONS);
-        let reached = problem.reach(awake, scope, limits)?;
+        let reached = problem.reach(awake, Scope::At(objects.clone(), many), limits)?;
         if reached.overflow {
             return Ok(None);
         }
-        let outcome = search_in(problem, options, awake, &reached, limits);
+        let outcome = search_in(asked, &reached, limits);
         if outcome.status != Status::Unsolvable {
             // Other actions might do it for less.
             return Ok(Some(Outcome {
@@ -55,42 +59,63 @@ pub(super) fn plan(
     Ok(None)
 }
 
-/// The objects that the instances on the way to the goal are about.
-fn on_the_way(problem: &Problem, way: &Reached) -> FixedBitSet {
-    let mut objects = FixedBitSet::new();
-    let mut taken = FixedBitSet::with_capacity(way.instances.len());
-    let mut open: Vec<Arrival> = Vec::new();
-    let mut add = |object: Object| objects.grow_and_insert(object as usize);
-    if let Some(goal) = way.goals.first() {
-        goal[..problem.goal.bound].iter().for_each(|&o| add(o));
-        let links = problem.goal.links.iter();
-        open.extend(links.map(|link| Arrival::Link(link.at(goal))));
+/// What a way to the goal that ignores what rules take away is about.
+#[derive(Debug, Default)]
+pub(super) struct Relaxed {
+    /// The objects of the instances on it, and of the goal.
+    pub(super) objects: FixedBitSet,
+    /// What the instances on it bring about for one another and for the goal.
+    pub(super) facts: Vec<Atom>,
+}
+
+impl Relaxed {
+    /// Follows the way back from the goal to what holds at first, by `facts`.
+    pub(super) fn of(problem: &Problem, way: &Reached, facts: &Facts) -> Self {
+        let mut relaxed = Self::default();
+        let mut taken = FixedBitSet::with_capacity(way.instances.len());
+        let mut open: Vec<Arrival> = Vec::new();
+        let mut met = FxHashSet::default();
+        if let Some(goal) = way.goals.first() {
+            relaxed.add_objects(&goal[..problem.goal.bound]);
+            let links = problem.goal.links.iter();
+            open.extend(links.map(|link| Arrival::Link(link.at(goal))));
+        }
+        while let Some(arrival) = open.pop() {
+            let (there, atom) = match arrival {
+                Arrival::Link(link) => (facts.has_link(link), Atom::Link(link)),
+                Arrival::Type(object, exact) => (
+                    facts.types(object).contains(&exact),
+                    Atom::Type(object, exact),
+                ),
+            };
+            let Some(&index) = way.achieved.get(&arrival).filter(|_| !there) else {
+                continue;
+            };
+            if met.insert(arrival) {
+                relaxed.facts.push(atom);
+            }
+            if taken.put(index) {
+                continue;
+            }
+            let instance = &way.instances[index];
+            let operator = &problem.program.operators[instance.operator];
+            relaxed.add_objects(&instance.objects[..operator.variables.len()]);
+            let links = operator.links.iter();
+            open.extend(links.map(|link| Arrival::Link(link.at(&instance.objects))));
+            for (slot, variable) in operator.variables[..operator.bound].iter().enumerate() {
+                let object = instance.objects[slot];
+                let types = variable.types.ones();
+                open.extend(types.map(|exact| Arrival::Type(object, exact as u16)));
+            }
+        }
+        relaxed
     }
-    while let Some(arrival) = open.pop() {
-        let there = match arrival {
-            Arrival::Link(link) => problem.world.facts.has_link(link),
-            Arrival::Type(object, exact) => problem.world.facts.types(object).contains(&exact),
-        };
-        let Some(&index) = way.achieved.get(&arrival).filter(|_| !there) else {
-            continue;
-        };
-        if taken.put(index) {
-            continue;
-        }
-        let instance = &way.instances[index];
-        let operator = &problem.program.operators[instance.operator];
-        for &object in &instance.objects[..operator.variables.len()] {
-            add(object);
-        }
-        let links = operator.links.iter();
-        open.extend(links.map(|link| Arrival::Link(link.at(&instance.objects))));
-        for (slot, variable) in operator.variables[..operator.bound].iter().enumerate() {
-            let object = instance.objects[slot];
-            let types = variable.types.ones();
-            open.extend(types.map(|exact| Arrival::Type(object, exact as u16)));
+
+    fn add_objects(&mut self, objects: &[Object]) {
+        for &object in objects {
+            self.objects.grow_and_insert(object as usize);
         }
     }
-    objects
 }
 
 /// Counts in what is one link away; whether there was anything.
@@ -112,7 +137,8 @@ fn widen(problem: &Problem, objects: &mut FixedBitSet) -> bool {
 mod tests {
     use crate::testing::{add, goal, read};
     use crate::{Effort, Limits, Options, Outcome, Status, plan};
-    use dsr::{Graph, Schema};
+    use dsr::{Graph, Schema, Time, Transaction};
+    use grammar::Grammar;
 
     const RULES: &str = "name=halls
 ===
@@ -184,6 +210,51 @@ place : active(1)
         let reason = outcome.reason.unwrap();
         assert!(
             reason.contains("room5 -in-> thing5 cannot be reached"),
+            "{reason}"
+        );
+    }
+
+    /// The halls where a room holds one thing, all but one full: to swap two things one of them has to wait in the
+    /// empty room, to which no link leads and which no way needs that ignores what rules take away.
+    fn full_halls(rooms: usize) -> (Grammar, Graph) {
+        let holding = "{ r:robot a:room t:thing r->a(in) r->t(has) }";
+        let holding_in_empty = "{ r:robot a:room t:thing r->a(in) r->t(has) a->a(empty) }";
+        let mut graph = halls(rooms);
+        let mut transaction = Transaction::new();
+        transaction.delete_node("thing1");
+        transaction.create_edge("room1", "empty", "room1");
+        graph.commit(&transaction, "test", Time::default()).unwrap();
+        (read(&RULES.replace(holding, holding_in_empty)), graph)
+    }
+
+    #[test]
+    fn what_the_way_passes_by_is_found_without_making_all_actions() {
+        for effort in [Effort::First, Effort::Anytime] {
+            let options = Options {
+                effort,
+                ..Options::default()
+            };
+            let (grammar, graph) = full_halls(350);
+            let (wanted, snapshot) = (goal(&grammar, SWAP), graph.snapshot());
+            let few = Limits::new().with_bytes(40_000_000);
+            let mut few = few.with_expansions(100_000);
+            let outcome = plan(&grammar, &snapshot, &wanted, &options, &mut few).unwrap();
+            assert_eq!(outcome.status, Status::Solved, "{:?}", outcome.reason);
+            // One thing to the empty room, the other to its place, and the first to the other's.
+            assert_eq!(outcome.steps.len(), 12);
+        }
+    }
+
+    #[test]
+    fn a_search_that_makes_no_actions_says_how_far_it_came() {
+        let (grammar, graph) = full_halls(350);
+        let mut few = Limits::new().with_expansions(60);
+        let (wanted, snapshot) = (goal(&grammar, SWAP), graph.snapshot());
+        let outcome = plan(&grammar, &snapshot, &wanted, &Options::default(), &mut few).unwrap();
+        assert_eq!((outcome.status, outcome.expanded), (Status::Limit, 60));
+        let reason = outcome.reason.unwrap();
+        assert!(
+            reason.contains("the nearest state still lacked thing"),
             "{reason}"
         );
     }

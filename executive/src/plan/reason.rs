@@ -35,12 +35,29 @@ pub(super) fn how_far(
             atom
         })
     });
-    let words: Vec<String> = words.take(MOST).collect();
-    if !words.is_empty() {
-        reason.push_str("; the nearest state still lacked ");
-        reason.push_str(&words.join(", "));
-    }
+    let words: Vec<String> = words.collect();
+    lacked(&mut reason, &words);
     reason
+}
+
+/// How far a search without ground actions came before it was stopped.
+pub(super) fn how_far_without_ground(
+    stop: StopReason,
+    expanded: u64,
+    missing: &[String],
+) -> String {
+    let mut reason = format!(
+        "stopped with no plan yet: {stop} (more actions than are made, {expanded} states expanded)"
+    );
+    lacked(&mut reason, missing);
+    reason
+}
+
+fn lacked(reason: &mut String, missing: &[String]) {
+    if !missing.is_empty() {
+        reason.push_str("; the nearest state still lacked ");
+        reason.push_str(&missing[..missing.len().min(MOST)].join(", "));
+    }
 }
 
 /// The literals that keep a formula from holding; of a choice, those of the part that lacks least.
@@ -83,9 +100,35 @@ pub(super) fn why_unsolvable(
         } else if !Reachability::new(&ground.task).goal {
             "no rule brings about what the goal's condition asks for".to_owned()
         } else {
-            format!("no order of steps works: all {expanded} states that matter were tried")
+            no_order(expanded)
         });
     }
+    let truncated = reached.truncated;
+    append_reservations(&mut reasons, problem, options, spares, truncated);
+    reasons.extend(ground.notes.iter().cloned());
+    reasons.join("; ")
+}
+
+fn no_order(expanded: u64) -> String {
+    format!("no order of steps works: all {expanded} states that matter were tried")
+}
+
+/// Why there is no plan where every state was met.
+pub(super) fn why_no_order(problem: &Problem, options: &Options, expanded: u64) -> String {
+    let mut reasons = vec![no_order(expanded)];
+    let spares = Some(options.spares);
+    append_reservations(&mut reasons, problem, options, spares, false);
+    reasons.join("; ")
+}
+
+/// Under which conditions there is no plan.
+fn append_reservations(
+    reasons: &mut Vec<String>,
+    problem: &Problem,
+    options: &Options,
+    spares: Option<usize>,
+    truncated: bool,
+) {
     if options.raised.iter().any(|raised| raised.by.is_infinite()) {
         reasons.push("steps that failed lately were left out".to_owned());
     }
@@ -94,12 +137,10 @@ pub(super) fn why_unsolvable(
     {
         reasons.push(format!("each rule was given {spares} new nodes at most"));
     }
-    if reached.truncated {
+    if truncated {
         reasons.push("attributes were followed through their first values only".to_owned());
     }
     reasons.extend(problem.program.notes.iter().cloned());
-    reasons.extend(ground.notes.iter().cloned());
-    reasons.join("; ")
 }
 
 /// The literals of the goal that even the relaxed task cannot reach.

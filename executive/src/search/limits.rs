@@ -133,6 +133,11 @@ impl<'a> Limits<'a> {
         self.cap = self.expanded.saturating_add(more);
     }
 
+    /// Whether as many states were expanded as these limits allow at all.
+    pub(crate) fn is_spent(&self) -> bool {
+        self.expanded >= self.expansions
+    }
+
     pub(crate) fn uncap(&mut self) {
         self.cap = u64::MAX;
     }

@@ -2,9 +2,9 @@
 //! becomes a constant and that no other fact is named than one that may change.
 
 use super::{Atom, Builder};
+use crate::ground::choices::{Choice, choices, read};
 use crate::ground::effects::each_choice;
 use crate::ground::program::{Environment, Object, Operator, Place, Quantified, Test};
-use crate::ground::reach::{Choice, choices, read};
 use crate::ground::value::{compare, evaluate};
 use crate::ground::vocabulary::TypeSet;
 use crate::task::{Fact, Formula, Literal};
