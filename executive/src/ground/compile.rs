@@ -397,7 +397,15 @@ pub(super) fn compile(
     let condition = goal.precondition.as_ref();
     let mut wanted = demand(&mut scope, &nodes, &[], &goal.pattern, condition)?;
     wanted.slots = scope.most;
+    // A strict rule must not leave any link hanging, also of labels that no rule names.
+    let strict = operators.iter().any(Operator::is_held_by_links);
+    if strict {
+        for label in schema.labels() {
+            vocabulary.labels.intern(&label.name);
+        }
+    }
     let mut program = Program {
+        strict,
         types: TypeSet::with_capacity(vocabulary.types.len()),
         made: vec![false; vocabulary.labels.len()],
         removed: vec![false; vocabulary.labels.len()],

@@ -155,6 +155,13 @@ impl Operator {
         self.bound < self.variables.len()
     }
 
+    /// Whether links that it does not take away may keep it from deleting a node.
+    pub(crate) fn is_held_by_links(&self) -> bool {
+        let mut deletes = false;
+        self.each_change(&mut |change| deletes |= matches!(change, Change::Delete(_)));
+        self.strict && deletes
+    }
+
     /// An environment with the constants in place.
     pub(crate) fn environment(&self) -> Environment {
         let mut environment = vec![UNBOUND; self.slots];
@@ -194,6 +201,8 @@ pub(crate) struct Program {
     pub(crate) removed: Vec<bool>,
     /// Whether a rule creates, deletes or retypes nodes.
     pub(crate) types_change: bool,
+    /// Whether a rule refuses to delete nodes that have links.
+    pub(crate) strict: bool,
     /// Attributes that rules assign and conditions or assigned values read.
     pub(crate) assigned: Vec<bool>,
     /// Rules that no plan can use, and why.

@@ -87,13 +87,23 @@ impl World {
             world.names.push(name);
             world.facts.add_type(object, exact);
         }
+        // What hangs on nodes that no rule speaks of keeps a strict rule from deleting: they all are one
+        // object here, which nothing can be bound to.
+        let elsewhere = program.strict.then(|| {
+            world.names.push("elsewhere".to_owned());
+            world.facts.add_object()
+        });
         for (label, name) in vocabulary.labels.iter() {
             let Some(label_id) = schema.find_label(name) else {
                 continue;
             };
             for key in snapshot.edges_of_label(label_id) {
                 let key = key?;
-                if let (Some(from), Some(to)) = (world.object(key.from), world.object(key.to)) {
+                let (from, to) = (world.object(key.from), world.object(key.to));
+                if from.is_none() && to.is_none() {
+                    continue;
+                }
+                if let (Some(from), Some(to)) = (from.or(elsewhere), to.or(elsewhere)) {
                     (label, from, to).hash(&mut hasher);
                     world.facts.add_link(Link { label, from, to });
                 }
@@ -148,10 +158,14 @@ impl World {
                 continue;
             };
             for (from, to) in self.facts.pairs(label).to_vec() {
+                let nodes = [from, to].map(|object| self.nodes.get(object as usize));
+                let [Some(&from_node), Some(&to_node)] = nodes else {
+                    continue;
+                };
                 let key = EdgeKey {
-                    from: self.nodes[from as usize],
+                    from: from_node,
                     label: label_id,
-                    to: self.nodes[to as usize],
+                    to: to_node,
                 };
                 let Some(edge) = snapshot.find_edge(key)? else {
                     continue;
