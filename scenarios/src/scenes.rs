@@ -95,6 +95,14 @@ pub enum ScenesError {
         /// The name.
         name: u64,
     },
+    /// The robot has another name than the links of a scene have for it.
+    #[error("line {line}: the robot is called {name}, where links call it {ROBOT}")]
+    Robot {
+        /// From 1.
+        line: usize,
+        /// The name.
+        name: u64,
+    },
     /// A link is of a kind that is not known.
     #[error("line {line}: a link is of the kind `{kind}`; there is `{INTERACT}`")]
     LinkKind {
@@ -135,6 +143,7 @@ struct RecordingFile {
 }
 
 #[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct FrameRecord {
     t: f64,
     people: Vec<PersonRecord>,
@@ -142,6 +151,7 @@ struct FrameRecord {
 }
 
 #[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct PersonRecord {
     id: u64,
     x_m: f64,
@@ -154,7 +164,8 @@ struct PersonRecord {
 
 /// Reads a recording of at least one frame: JSON with `frames`, each `{"t", "people": [{"id", "x_m", "y_m", "theta_rad"}],
 /// "groups": [[id, ...]]}`; `groups` may be missing, and of people the texts `activity`, `features` and
-/// `task`. Metres, radians counter-clockwise from +x.
+/// `task`. Metres, radians counter-clockwise from +x. Beside `frames`, the file may say what it likes; unknown keys of a
+/// frame or a person are errors.
 ///
 /// # Errors
 /// [`ScenesError`].
@@ -224,10 +235,12 @@ fn json_error(error: &serde_json::Error, lines_before: usize) -> ScenesError {
 
 /// A scene as the `SocNav1` data set has it.
 #[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
+#[serde(rename_all = "camelCase", deny_unknown_fields)]
 struct SceneRecord {
     identifier: String,
     score: Option<f64>,
+    #[serde(default)]
+    robot: RobotRecord,
     #[serde(default)]
     humans: Vec<EntityRecord>,
     #[serde(default)]
@@ -238,8 +251,15 @@ struct SceneRecord {
     room: Vec<[f64; 2]>,
 }
 
+/// The robot is at the origin, whatever its number.
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RobotRecord {
+    id: u64,
+}
+
 #[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
+#[serde(rename_all = "camelCase", deny_unknown_fields)]
 struct EntityRecord {
     id: u64,
     x_pos: f64,
@@ -270,6 +290,10 @@ pub fn parse_scenes(text: &str) -> Result<Vec<RatedScene>, ScenesError> {
         let line = before + 1;
         if let Some(score) = record.score.filter(|score| !(0.0..=100.0).contains(score)) {
             return Err(ScenesError::Score { line, score });
+        }
+        if record.robot.id != ROBOT {
+            let name = record.robot.id;
+            return Err(ScenesError::Robot { line, name });
         }
         let mut places = BTreeMap::from([(ROBOT, Point2::origin())]);
         for entity in record.humans.iter().chain(&record.objects) {
@@ -368,6 +392,11 @@ mod tests {
         let vast = twice.replacen("1,", "1e999,", 1);
         assert!(refused(&vast).contains("number out of range"));
         assert_eq!(refused("{\"frames\": []}"), "there are no frames");
+        assert_eq!(
+            refused("{\"frames\": [{\"t\": 1, \"people\": [{\"id\": 4, \"mood\": 1}]}]}"),
+            "line 1, column 48: unknown field `mood`, expected one of `id`, `x_m`, `y_m`, `theta_rad`, `activity`, \
+             `features`, `task`"
+        );
         let groups = |groups: &str| {
             format!("{{\"frames\": [{{\"t\": 1, \"people\": [], \"groups\": {groups}}}]}}")
         };
@@ -416,6 +445,27 @@ mod tests {
                 "[{\"id\": 1",
                 "[{\"id\": 0",
                 "line 2: 0 is in the scene twice (the robot is 0)",
+            ),
+            (
+                "\"robot\": {\"id\": 0}",
+                "\"robot\": {\"id\": 3}",
+                "line 2: the robot is called 3, where links call it 0",
+            ),
+            (
+                "\"yPos\": -50",
+                "\"yPos\": -50, \"angle\": 3",
+                "line 2, column 107: unknown field `angle`, expected one of `id`, `xPos`, `yPos`, `orientation`",
+            ),
+            (
+                "\"room\"",
+                "\"rooms\"",
+                "line 2, column 225: unknown field `rooms`, expected one of `identifier`, `score`, `robot`, `humans`, \
+                 `objects`, `links`, `room`",
+            ),
+            (
+                "\"links\"",
+                "\"room\": [], \"links\"",
+                "line 2, column 236: duplicate field `room`",
             ),
             (
                 "40",

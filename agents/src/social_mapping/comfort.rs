@@ -7,6 +7,7 @@ use super::gaussian::AsymmetricGaussian;
 use super::groups::{Grouping, TooCrowded};
 use super::scene::{FARTHEST, Wall, is_place, is_pose};
 use super::stamps::distance_to_segment;
+use geo::Validation;
 use nalgebra::{Isometry2, Point2};
 use serde::{Deserialize, Serialize};
 
@@ -56,6 +57,12 @@ pub enum ComfortError {
     /// Nothing fits into the room.
     #[error("the room of {corners} corners encloses nothing")]
     Room {
+        /// How many corners it has.
+        corners: usize,
+    },
+    /// An outline that crosses or touches itself leaves open what is inside.
+    #[error("the outline of the room, of {corners} corners, crosses itself")]
+    Crossed {
         /// How many corners it has.
         corners: usize,
     },
@@ -159,6 +166,9 @@ impl ComfortScene {
         if corners > 0 && area(&self.room) < LEAST_AREA {
             return Err(ComfortError::Room { corners });
         }
+        if corners > 0 && !is_simple(&self.room) {
+            return Err(ComfortError::Crossed { corners });
+        }
         Ok(())
     }
 }
@@ -177,6 +187,12 @@ fn area(outline: &[Point2<f64>]) -> f64 {
         .map(|pair| (pair[0] - first, pair[1] - first));
     let twice: f64 = pairs.map(|(a, b)| a.perp(&b)).sum();
     (twice / 2.0).abs()
+}
+
+/// Whether a closed outline crosses itself nowhere.
+fn is_simple(outline: &[Point2<f64>]) -> bool {
+    let ring = outline.iter().map(|p| geo::Coord { x: p.x, y: p.y });
+    geo::Polygon::new(ring.collect(), Vec::new()).is_valid()
 }
 
 /// Whether a point is within a closed outline (even-odd).
@@ -301,6 +317,16 @@ mod tests {
         assert_eq!(
             refused(torn, 0.0),
             "corner 2 of the room is no place within 1e8 m"
+        );
+        let crossed = ComfortScene {
+            room: [(-2.0, -2.0), (2.0, 2.0), (2.0, -2.0), (-2.0, 1.0)]
+                .map(|(x, y)| Point2::new(x, y))
+                .to_vec(),
+            ..empty()
+        };
+        assert_eq!(
+            refused(crossed, 0.0),
+            "the outline of the room, of 4 corners, crosses itself"
         );
         let open = ComfortScene {
             links: vec![[Point2::origin(), Point2::new(f64::NAN, 0.0)]],

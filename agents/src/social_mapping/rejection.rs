@@ -5,7 +5,7 @@ use super::features::FeatureError;
 use super::groups::TooCrowded;
 use super::limits::{LARGEST_BODY, MOST_LENGTH, MOST_SPEED};
 use super::object_space::NoDuration;
-use super::scene::FARTHEST;
+use super::scene::{BODY_RADIUS, FARTHEST};
 use std::fmt;
 
 /// An item that was left out of the map or mended.
@@ -26,7 +26,9 @@ pub enum Rejection {
         name: String,
     },
     /// The person has the radius [`BODY_RADIUS`].
-    #[error("person {name} is given the usual radius: {radius} m is none up to {LARGEST_BODY} m")]
+    #[error(
+        "person {name} is given the usual radius, {BODY_RADIUS} m: {radius} m is none up to {LARGEST_BODY} m"
+    )]
     PersonRadius {
         /// The person.
         name: String,
@@ -53,6 +55,16 @@ pub enum Rejection {
         given: String,
         /// The nearest name in the configuration, or all.
         help: String,
+    },
+    /// The person counts as being in the first of them.
+    #[error("person {name} is in several rooms, {rooms}: {first} counts")]
+    PersonRooms {
+        /// The person.
+        name: String,
+        /// The rooms by name.
+        rooms: String,
+        /// The first.
+        first: String,
     },
     /// The person's features are left out.
     #[error("person {name} has no features: {error}")]
@@ -180,6 +192,7 @@ impl Rejection {
             Self::PersonPose { .. }
             | Self::PersonVelocity { .. }
             | Self::PersonRadius { .. }
+            | Self::PersonRooms { .. }
             | Self::Object { .. }
             | Self::Groups(_)
             | Self::Interaction { .. }

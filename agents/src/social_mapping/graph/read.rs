@@ -35,7 +35,7 @@ fn vector(node: &Node<'_>, name: &str, absent: f64) -> Result<Vector2<f64>, dsr:
 /// People and objects without a pose are nowhere and not in the scene. A person without `velocity`
 /// stands, one without `radius` has [`BODY_RADIUS`]. The robot's radius is that of the largest robot.
 /// A person's `activity`, `features` (read as [`Features::parse`](crate::social_mapping::features::Features::parse)
-/// says) and `task` shape their space; without `activity`, that of the room they are `in`, and without `task`, the rule of
+/// says) and `task` shape their space; without `activity`, that of the room they are `in` (of several, which is reported, the first by name), and without `task`, the rule of
 /// a running step bound to them that has cooperation zones. A world without `social` is social. A circle's diameter is its larger `size`. An activity that is not `cancelled` uses
 /// the objects its `uses` edges lead to and the one its `object` names.
 ///
@@ -125,12 +125,22 @@ fn manner(
         task: text("task")?,
         ..Manner::default()
     };
-    if let Some(label) = snapshot.schema().find_label("in")
-        && let Some(edge) = node.out_edges_of(label).next()
-        && let Some(room) = snapshot.find_node(edge?.to)?
-    {
-        manner.room = Some(room.name()?);
+    let label = snapshot.schema().find_label("in");
+    let mut rooms = Vec::new();
+    for edge in label.into_iter().flat_map(|label| node.out_edges_of(label)) {
+        if let Some(room) = snapshot.find_node(edge?.to)? {
+            rooms.push(room.name()?);
+        }
     }
+    rooms.sort_unstable();
+    if rooms.len() > 1 {
+        rejected.push(Rejection::PersonRooms {
+            name: node.name()?,
+            rooms: rooms.join(", "),
+            first: rooms[0].clone(),
+        });
+    }
+    manner.room = rooms.into_iter().next();
     if let Some(text) = text("features")? {
         match features.parse(&text) {
             Ok(values) => manner.features = values,

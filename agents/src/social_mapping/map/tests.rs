@@ -300,7 +300,7 @@ fn bad_items_are_left_out_or_mended_and_always_reported() {
     expect_test::expect![[r"
         person ghost is ignored: the pose is no place within 1e8 m
         person ana is taken to stand still: the velocity is none of up to 100 m/s
-        person ana is given the usual radius: -1 m is none up to 10 m
+        person ana is given the usual radius, 0.25 m: -1 m is none up to 10 m
         person voyager is ignored: the pose is no place within 1e8 m
         object hole is ignored: its pose is no place within 1e8 m, or its size none of up to 1000 m
         object flat is ignored: its pose is no place within 1e8 m, or its size none of up to 1000 m
