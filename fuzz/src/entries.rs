@@ -215,7 +215,7 @@ pub fn grammar(bytes: &[u8]) {
     show(diagnostics);
     show(grammar.analyse(None));
     for grammar in sound.iter().chain([&grammar]) {
-        let conflicts = grammar.conflicts(CONFLICT_EFFORT);
+        let conflicts = grammar.conflicts(None, CONFLICT_EFFORT);
         assert!(conflicts.found.len() <= grammar::CONFLICT_LIMIT);
         let conflicts = conflicts.found.into_iter();
         show(conflicts.map(|conflict| conflict.diagnostic).collect());

@@ -2,9 +2,9 @@
 //!
 //! Guarantee: what is said to be known of a condition in a draft stays so however much is drawn yet.
 
-use super::draft::{Draft, Places, owner};
-use crate::{AttributePath, Comparison, Condition, Expression, PatternNode, Types};
-use dsr::Value;
+use super::draft::{Draft, Places};
+use super::values::{Asked, Term, Unknown};
+use crate::{Condition, PatternNode, Types};
 use std::cell::Cell;
 use std::rc::Rc;
 
@@ -13,17 +13,31 @@ const WAYS: usize = 16;
 /// How many formulas are looked at for one graph, each as often as there are ways to come to it.
 const FORMULAS: usize = 500;
 
-/// Finds ways to make conditions come out one way or the other, and so that little would change it.
+/// How much of a draft is taken as it is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Drawn {
+    /// What is drawn.
+    Parts,
+    /// The nodes and links are all that there are.
+    Links,
+    /// There is nothing else, and no other values.
+    Whole,
+}
+
+/// Finds ways to make conditions come out one way or the other.
 pub(super) struct Ways<'t> {
     types: &'t Types,
+    /// What makes a formula come out should be its only reason, so that little would change it.
+    fragile: bool,
     /// So many formulas are still looked at.
     left: Cell<usize>,
 }
 
 impl<'t> Ways<'t> {
-    pub(super) fn new(types: &'t Types) -> Self {
+    pub(super) fn new(types: &'t Types, fragile: bool) -> Self {
         Self {
             types,
+            fragile,
             left: Cell::new(FORMULAS),
         }
     }
@@ -45,6 +59,11 @@ impl<'t> Ways<'t> {
             return vec![draft];
         };
         self.left.set(left);
+        if !self.fragile
+            && let Some(known) = self.known(&draft, places, condition, Drawn::Parts)
+        {
+            return Vec::from_iter((known == holds).then_some(draft));
+        }
         let mut found = self.all(draft, places, condition, holds);
         found.sort_by_key(|draft| (draft.nodes.len(), draft.links.len()));
         found.dedup();
@@ -76,13 +95,12 @@ impl<'t> Ways<'t> {
                 },
                 _,
             ) => {
-                if holds {
-                    return compared(draft, places, *operator, left, right);
-                }
-                // A missing attribute will do, too.
-                let mut found = vec![draft.clone()];
-                found.extend(compared(draft, places, operator.negated(), left, right));
-                found
+                let sides = [left, right].map(|side| Term::of(side, places));
+                let [Some(left), Some(right)] = sides else {
+                    return vec![draft];
+                };
+                let with = draft.with_asked(*operator, [left, right], holds);
+                with.into_iter().collect()
             }
             (Condition::Not(inner), _) => self.to(draft, places, inner, !holds),
             (Condition::And(all), true) | (Condition::Or(all), false) => {
@@ -93,6 +111,9 @@ impl<'t> Ways<'t> {
                 let mut found = Vec::new();
                 for one in any {
                     found.extend(self.to(draft.clone(), places, one, holds));
+                    if !self.fragile {
+                        continue;
+                    }
                     // As the only one: so that without it the whole comes out the other way.
                     let only = any.iter().map(|c| (c, (c == one) == holds));
                     found.extend(self.every(draft.clone(), places, only));
@@ -109,7 +130,7 @@ impl<'t> Ways<'t> {
                 let (condition, consequence) = (&**condition, &**consequence);
                 let mut found = self.to(draft.clone(), places, condition, false);
                 found.extend(self.to(draft.clone(), places, consequence, true));
-                for both in [true, false] {
+                for both in [true, false].into_iter().filter(|_| self.fragile) {
                     let both = [(condition, both), (consequence, both)];
                     found.extend(self.every(draft.clone(), places, both.into_iter()));
                 }
@@ -148,6 +169,9 @@ impl<'t> Ways<'t> {
         for (draft, chosen) in self.chosen(draft, places, variables, true) {
             for draft in self.to(draft, &chosen, body, holds) {
                 found.push(draft.clone());
+                if !self.fragile {
+                    continue;
+                }
                 let mut only = vec![draft.clone()];
                 for (_, other) in self.chosen(draft, places, variables, false) {
                     if !other.nodes().eq(chosen.nodes()) {
@@ -171,6 +195,22 @@ impl<'t> Ways<'t> {
         holds: bool,
     ) -> Vec<Draft> {
         let mut found = vec![draft.clone()];
+        // As little as can be is changed for those of which it does not come out so.
+        let mut mended = vec![draft.clone()];
+        for (_, places) in self.chosen(draft.clone(), places, variables, false) {
+            let more = mended.into_iter().flat_map(|draft| {
+                if self.known(&draft, &places, body, Drawn::Links) == Some(holds) {
+                    vec![draft]
+                } else {
+                    self.to(draft, &places, body, holds)
+                }
+            });
+            mended = more.take(WAYS).collect();
+        }
+        found.extend(mended);
+        if !self.fragile {
+            return found;
+        }
         let mut by_all = vec![draft.clone()];
         for (_, places) in self.chosen(draft.clone(), places, variables, false) {
             let more = by_all.into_iter();
@@ -201,23 +241,24 @@ impl<'t> Ways<'t> {
         drafts
     }
 
-    /// Whether a condition holds in the draft, as far as it is drawn; where `whole`, what is not drawn is not there. What
-    /// is known of a part stays so however much is drawn yet.
+    /// Whether a condition holds in the draft, as far as that can be said. What is known of a part stays so however
+    /// much is drawn yet.
     pub(super) fn known(
         &self,
         draft: &Draft,
         places: &Places,
         condition: &Condition,
-        whole: bool,
+        drawn: Drawn,
     ) -> Option<bool> {
-        let known = |condition| self.known(draft, places, condition, whole);
+        let known = |condition| self.known(draft, places, condition, drawn);
+        let are_all = drawn != Drawn::Parts;
         match condition {
             Condition::Edge { label, from, to } => {
                 let link = (places.get(from)?, Rc::from(&**label), places.get(to)?);
                 if draft.links.contains(&link) {
                     return Some(true);
                 }
-                (whole || draft.absent.contains(&link)).then_some(false)
+                (are_all || draft.absent.contains(&link)).then_some(false)
             }
             Condition::Same(a, b) => Some(places.get(a)? == places.get(b)?),
             Condition::Compare {
@@ -225,20 +266,17 @@ impl<'t> Ways<'t> {
                 left,
                 right,
             } => {
-                let value = |expression: &Expression| match expression {
-                    Expression::Literal(literal) => Ok(literal.value()),
-                    Expression::Attribute(path) => {
-                        let value = owner(path, places).and_then(|at| draft.values.get(&at));
-                        value.cloned().ok_or(whole)
-                    }
-                    Expression::Arithmetic { .. } => Err(false),
+                let sides = [Term::of(left, places)?, Term::of(right, places)?];
+                let asked = Asked {
+                    operator: *operator,
+                    sides,
+                    holds: true,
                 };
-                match (value(left), value(right)) {
-                    (Ok(left), Ok(right)) => Some(operator.holds(&left, &right)),
-                    // A comparison with what is not there does not hold.
-                    (Err(true), _) | (_, Err(true)) => Some(false),
-                    _ => None,
-                }
+                asked.is_met(&|key| match draft.values.get(key) {
+                    Some(value) => Ok(Some(value.clone())),
+                    None if drawn == Drawn::Whole => Ok(None),
+                    None => Err(Unknown),
+                })
             }
             Condition::Not(inner) => known(inner).map(|holds| !holds),
             Condition::And(all) => every(all.iter().map(known)),
@@ -257,20 +295,21 @@ impl<'t> Ways<'t> {
                 let exists = matches!(condition, Condition::Exists { .. });
                 let all = self.chosen(draft.clone(), places, variables, false);
                 let each = all.iter().map(|(draft, places)| {
-                    let holds = self.known(draft, places, body, whole)?;
+                    let holds = self.known(draft, places, body, drawn)?;
                     Some(holds != exists)
                 });
                 match every(each) {
                     Some(false) => Some(exists),
                     // There may be more nodes, or more of these than were looked at.
-                    Some(true) if whole && all.len() < WAYS * WAYS => Some(!exists),
+                    Some(true) if are_all && all.len() < WAYS * WAYS => Some(!exists),
                     _ => None,
                 }
             }
         }
     }
 
-    /// The draft with nodes for quantified variables: those that are there and, if `more`, new ones.
+    /// The draft with nodes for quantified variables: those that are there and, if `more`, new ones and those that may
+    /// be of the type.
     fn chosen(
         &self,
         draft: Draft,
@@ -288,9 +327,15 @@ impl<'t> Ways<'t> {
                     places.insert(&name, node);
                     places
                 };
+                let asked = &*variable.type_name;
                 for (index, (_, exact)) in draft.nodes.iter().enumerate() {
-                    if self.types.is_subtype(exact, &variable.type_name) {
+                    if self.types.is_subtype(exact, asked) {
                         next.push((draft.clone(), choose(index)));
+                    } else if more && self.types.is_subtype(asked, exact) {
+                        // It may be of the narrower type.
+                        let mut narrower = draft.clone();
+                        narrower.narrow(index, asked);
+                        next.push((narrower, choose(index)));
                     }
                 }
                 if more {
@@ -318,64 +363,4 @@ fn every(all: impl Iterator<Item = Option<bool>>) -> Option<bool> {
         }
     }
     known
-}
-
-/// Values that meet a comparison of attributes with each other or with a constant.
-fn compared(
-    draft: Draft,
-    places: &Places,
-    operator: Comparison,
-    left: &Expression,
-    right: &Expression,
-) -> Vec<Draft> {
-    let value = |expression: &Expression| match expression {
-        Expression::Attribute(path) => {
-            owner(path, places).and_then(|owner| draft.values.get(&owner).cloned())
-        }
-        Expression::Literal(literal) => Some(literal.value()),
-        Expression::Arithmetic { .. } => None,
-    };
-    let known = (value(left), value(right));
-    let tries = |other: &Value| -> Vec<Value> {
-        match other.as_f64() {
-            Some(x) => vec![other.clone(), (x - 1.0).into(), (x + 1.0).into()],
-            None => vec![other.clone(), "other".into()],
-        }
-    };
-    let (path, tried): (&AttributePath, Vec<Value>) = match (left, right, &known) {
-        (_, _, (Some(a), Some(b))) => {
-            return if operator.holds(a, b) {
-                vec![draft]
-            } else {
-                Vec::new()
-            };
-        }
-        (Expression::Attribute(path), _, (None, Some(b))) => {
-            let fits = |a: &Value| operator.holds(a, b);
-            (path, tries(b).into_iter().filter(fits).collect())
-        }
-        (_, Expression::Attribute(path), (Some(a), None)) => {
-            let fits = |b: &Value| operator.holds(a, b);
-            (path, tries(a).into_iter().filter(fits).collect())
-        }
-        (Expression::Attribute(first), Expression::Attribute(_), (None, None)) => {
-            let Some(first) = owner(first, places) else {
-                return vec![draft];
-            };
-            return draft
-                .with_value(first, Value::I64(1))
-                .into_iter()
-                .flat_map(|draft| compared(draft, places, operator, left, right))
-                .collect();
-        }
-        // What arithmetic comes to is left to be seen.
-        _ => return vec![draft],
-    };
-    let Some(owner) = owner(path, places) else {
-        return vec![draft];
-    };
-    tried
-        .into_iter()
-        .flat_map(|value| draft.clone().with_value(owner.clone(), value))
-        .collect()
 }

@@ -5,8 +5,10 @@
 
 use super::facts::{Compared, Facts, constant};
 use super::order::Side;
+use crate::matching::conjuncts;
 use crate::{
-    Arithmetic, AttributePath, Condition, Expression, Grammar, Name, Number, PatternNode, Rule,
+    Arithmetic, AttributePath, Condition, Expression, Grammar, Name, Number, PatternEdge,
+    PatternNode, Rule, Types,
 };
 use dsr::Schema;
 use std::collections::BTreeMap;
@@ -14,6 +16,8 @@ use std::rc::Rc;
 
 /// So many formulas are looked at for a rule.
 const FORMULAS: usize = 1_000;
+/// Formulas for all nodes are said of so many beside those of the match.
+const NODES: usize = 8;
 
 /// A node that a variable stands for: those of the match come first.
 pub(super) type Node = usize;
@@ -43,13 +47,15 @@ impl Asked<'_> {
 struct ForAll<'r> {
     variables: &'r [PatternNode],
     body: Asked<'r>,
+    /// It was said of so many nodes.
+    seen: usize,
 }
 
 #[derive(Clone)]
 struct Case<'r> {
     facts: Facts<'r>,
-    /// The types of the nodes.
-    nodes: Vec<&'r Name>,
+    /// The types of the nodes, of which each has all.
+    nodes: Vec<Vec<&'r Name>>,
     asked: Vec<Asked<'r>>,
     /// Of each of these formulas, one part must hold.
     open: Vec<(Asked<'r>, Vec<Asked<'r>>)>,
@@ -57,9 +63,20 @@ struct Case<'r> {
 }
 
 struct Search<'r> {
-    grammar: &'r Grammar,
+    types: &'r Types,
     bound: usize,
     left: usize,
+}
+
+/// Nodes, and what must hold of them all together.
+pub(super) struct Together<'r> {
+    pub(super) types: &'r Types,
+    pub(super) schema: Option<&'r Schema>,
+    /// Variables that stand for different nodes, and the types that each has.
+    pub(super) nodes: Vec<(&'r Name, Vec<&'r Name>)>,
+    /// Of left sides.
+    pub(super) links: Vec<&'r PatternEdge>,
+    pub(super) conditions: Vec<&'r Condition>,
 }
 
 /// Why a rule's left side and precondition hold nowhere, if that can be seen.
@@ -68,41 +85,87 @@ pub(super) fn contradiction(
     rule: &Rule,
     schema: Option<&Schema>,
 ) -> Option<String> {
-    let mut scope = BTreeMap::new();
-    let mut nodes = Vec::new();
-    for node in rule.bound_nodes() {
-        scope.insert(node.variable.clone(), nodes.len());
-        nodes.push(&node.type_name);
+    let nodes = rule.bound_nodes();
+    let together = Together {
+        types: &grammar.types,
+        schema,
+        nodes: nodes.map(|n| (&n.variable, vec![&n.type_name])).collect(),
+        links: rule.left.edges.iter().collect(),
+        conditions: rule.precondition.iter().collect(),
+    };
+    together.contradiction().0
+}
+
+impl<'r> Together<'r> {
+    /// Why they hold in no graph, if that can be seen; and how many formulas were looked at.
+    pub(super) fn contradiction(self) -> (Option<String>, usize) {
+        let mut search = Search {
+            types: self.types,
+            bound: self.nodes.len(),
+            left: FORMULAS,
+        };
+        let reason = self.close(&mut search);
+        (reason, FORMULAS - search.left)
     }
-    let scope = Rc::new(scope);
-    let mut search = Search {
-        grammar,
-        bound: nodes.len(),
-        left: FORMULAS,
-    };
-    let mut case = Case {
-        facts: Facts::new(schema),
-        nodes,
-        asked: Vec::new(),
-        open: Vec::new(),
-        universal: Vec::new(),
-    };
-    for edge in &rule.left.edges {
-        if let (Some(&from), Some(&to)) = (scope.get(&edge.from), scope.get(&edge.to)) {
-            let words = || format!("{}->{}({})", edge.from, edge.to, edge.label);
-            let link = (from, &edge.label, to);
-            if let Some(reason) = case.facts.link(link, !edge.negated, words) {
-                return Some(reason);
+
+    fn close(self, search: &mut Search<'r>) -> Option<String> {
+        let mut scope = BTreeMap::new();
+        let mut nodes = Vec::new();
+        for (name, types) in self.nodes {
+            scope.insert(name.clone(), nodes.len());
+            nodes.push(types);
+        }
+        let scope = Rc::new(scope);
+        let mut case = Case {
+            facts: Facts::new(self.schema),
+            nodes,
+            asked: Vec::new(),
+            open: Vec::new(),
+            universal: Vec::new(),
+        };
+        for edge in self.links {
+            if let (Some(&from), Some(&to)) = (scope.get(&edge.from), scope.get(&edge.to)) {
+                let words = || format!("{}->{}({})", edge.from, edge.to, edge.label);
+                let link = (from, &edge.label, to);
+                if let Some(reason) = case.facts.link(link, !edge.negated, words) {
+                    return Some(reason);
+                }
             }
         }
-    }
-    case.asked
-        .extend(rule.precondition.iter().map(|condition| Asked {
+        let asked = self.conditions.into_iter().map(|condition| Asked {
             condition,
             holds: true,
             scope: Rc::clone(&scope),
-        }));
-    search.close(case)
+        });
+        case.asked.extend(asked);
+        search.close(case)
+    }
+}
+
+impl<'r> Case<'r> {
+    /// Nodes for variables of which the body comes out as `holds` for some.
+    fn chosen(
+        &mut self,
+        variables: &'r [PatternNode],
+        body: &'r Condition,
+        holds: bool,
+        scope: &BTreeMap<Name, Node>,
+    ) -> BTreeMap<Name, Node> {
+        let mut inner = scope.clone();
+        for variable in variables {
+            let name = &variable.variable;
+            let same = holds.then(|| same_as(name, body)).flatten();
+            let outside = same.filter(|same| variables.iter().all(|v| v.variable != **same));
+            let known = outside.and_then(|same| scope.get(same)).copied();
+            let node = known.unwrap_or(self.nodes.len());
+            if known.is_none() {
+                self.nodes.push(Vec::new());
+            }
+            self.nodes[node].push(&variable.type_name);
+            inner.insert(name.clone(), node);
+        }
+        inner
+    }
 }
 
 impl<'r> Search<'r> {
@@ -115,15 +178,24 @@ impl<'r> Search<'r> {
                     return Some(reason);
                 }
             }
-            let Some(universal) = case.universal.pop() else {
+            // Nodes that formulas for all of them ask for are enough after a few.
+            let count = case.nodes.len().min(self.bound + NODES);
+            let mut universal = case.universal.iter_mut();
+            let Some(next) = universal.find(|next| next.seen < count) else {
+                if self.narrow(&mut case) {
+                    continue;
+                }
                 break;
             };
-            self.instances(&universal, &mut case)?;
+            let before = std::mem::replace(&mut next.seen, count);
+            let next = next.clone();
+            self.instances(&next, before, &mut case)?;
         }
         if let Some(reason) = case.facts.contradiction() {
             return Some(reason);
         }
-        let (whole, parts) = case.open.pop()?;
+        let fewest = (0..case.open.len()).min_by_key(|index| case.open[*index].1.len())?;
+        let (whole, parts) = case.open.remove(fewest);
         let mut reasons = Vec::new();
         for part in parts {
             let mut next = case.clone();
@@ -141,25 +213,107 @@ impl<'r> Search<'r> {
         }
     }
 
-    /// What a formula for all nodes asks of those that there are.
-    fn instances(&mut self, universal: &ForAll<'r>, case: &mut Case<'r>) -> Option<()> {
-        let types = &self.grammar.types;
-        let mut scopes = vec![(*universal.body.scope).clone()];
+    /// Leaves out what is known not to hold, and asks for what is the only part left; whether there was any.
+    fn narrow(&self, case: &mut Case<'r>) -> bool {
+        let mut open = std::mem::take(&mut case.open);
+        open.retain_mut(|(_, parts)| {
+            let mut holds = false;
+            parts.retain(|part| {
+                let known = self.known(part.condition, part.holds, &part.scope, case);
+                holds |= known == Some(true);
+                known != Some(false)
+            });
+            if let ([one], false) = (&parts[..], holds) {
+                case.asked.push(one.clone());
+                return false;
+            }
+            !holds
+        });
+        case.open = open;
+        !case.asked.is_empty()
+    }
+
+    /// Whether a formula comes out as `holds`, by what is known.
+    fn known(
+        &self,
+        condition: &Condition,
+        holds: bool,
+        scope: &Scope,
+        case: &Case<'r>,
+    ) -> Option<bool> {
+        let known = |condition, holds| self.known(condition, holds, scope, case);
+        let all = |parts: &mut dyn Iterator<Item = Option<bool>>| {
+            let mut all = Some(true);
+            for part in parts {
+                match part {
+                    Some(false) => return Some(false),
+                    Some(true) => {}
+                    None => all = None,
+                }
+            }
+            all
+        };
+        match condition {
+            Condition::Edge { label, from, to } => {
+                let link = (*scope.get(from)?, &**label, *scope.get(to)?);
+                Some(case.facts.known_link(link)? == holds)
+            }
+            Condition::Same(a, b) => {
+                let (one, other) = (*scope.get(a)?, *scope.get(b)?);
+                let bound = one < self.bound && other < self.bound;
+                (bound || one == other).then_some((one == other) == holds)
+            }
+            Condition::Compare {
+                operator,
+                left,
+                right,
+            } => {
+                let keys = [key(left, scope)?, key(right, scope)?];
+                Some(case.facts.known_comparison(*operator, keys)? == holds)
+            }
+            Condition::Not(inner) => known(inner, !holds),
+            Condition::And(list) | Condition::Or(list) => {
+                let every = matches!(condition, Condition::And(_)) == holds;
+                let mut parts = list.iter().map(|part| known(part, holds == every));
+                let whole = all(&mut parts)?;
+                Some(whole == every)
+            }
+            Condition::When {
+                condition,
+                consequence,
+            } => {
+                let broken = [known(condition, true), known(consequence, false)];
+                Some(all(&mut broken.into_iter())? != holds)
+            }
+            Condition::Exists { .. } | Condition::Forall { .. } => None,
+        }
+    }
+
+    /// What a formula for all nodes asks of those that there are and it was not said of `before`.
+    fn instances(
+        &mut self,
+        universal: &ForAll<'r>,
+        before: usize,
+        case: &mut Case<'r>,
+    ) -> Option<()> {
+        let mut scopes = vec![((*universal.body.scope).clone(), false)];
         for variable in universal.variables {
             let mut next = Vec::new();
-            for scope in scopes {
-                for (node, exact) in case.nodes.iter().enumerate() {
-                    if types.is_subtype(exact, &variable.type_name) {
+            for (scope, has_new) in scopes {
+                for (node, types) in case.nodes.iter().enumerate().take(universal.seen) {
+                    let mut types = types.iter();
+                    if types.any(|exact| self.types.is_subtype(exact, &variable.type_name)) {
                         self.left = self.left.checked_sub(1)?;
                         let mut scope = scope.clone();
                         scope.insert(variable.variable.clone(), node);
-                        next.push(scope);
+                        next.push((scope, has_new || node >= before));
                     }
                 }
             }
             scopes = next;
         }
-        case.asked.extend(scopes.into_iter().map(|scope| Asked {
+        let new = scopes.into_iter().filter(|(_, has_new)| *has_new);
+        case.asked.extend(new.map(|(scope, _)| Asked {
             scope: Rc::new(scope),
             ..universal.body.clone()
         }));
@@ -245,25 +399,35 @@ impl<'r> Search<'r> {
             }
             (Condition::Exists { variables, body }, true)
             | (Condition::Forall { variables, body }, false) => {
-                let mut inner = (*scope).clone();
-                for variable in variables {
-                    inner.insert(variable.variable.clone(), case.nodes.len());
-                    case.nodes.push(&variable.type_name);
-                }
+                let scope = Rc::new(case.chosen(variables, body, holds, &scope));
                 case.asked.push(Asked {
                     condition: body,
                     holds,
-                    scope: Rc::new(inner),
+                    scope,
                 });
             }
             (Condition::Exists { variables, body }, false)
             | (Condition::Forall { variables, body }, true) => {
                 let body = part(body, holds);
-                case.universal.push(ForAll { variables, body });
+                let seen = 0;
+                case.universal.push(ForAll {
+                    variables,
+                    body,
+                    seen,
+                });
             }
         }
         None
     }
+}
+
+/// A variable that must be the same node for a formula to hold.
+fn same_as<'r>(name: &Name, body: &'r Condition) -> Option<&'r Name> {
+    conjuncts(body).into_iter().find_map(|part| match part {
+        Condition::Same(a, b) if a == name && b != name => Some(b),
+        Condition::Same(a, b) if b == name && a != name => Some(a),
+        _ => None,
+    })
 }
 
 /// What tells expressions apart: the same for the same attribute of the same node.

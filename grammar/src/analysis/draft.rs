@@ -2,10 +2,14 @@
 //!
 //! Guarantee: a draft never has a link that something asked not to be there.
 
-use crate::{AttributePath, Effect, Expression};
-use dsr::{EdgeRef, Transaction, Value};
-use std::collections::{BTreeMap, BTreeSet};
+use super::values::{Asked, Key, Term, Unknown, Values, values};
+use crate::{AttributePath, Comparison, Effect, PatternNode, Types};
+use dsr::{EdgeRef, Schema, Transaction};
+use std::collections::BTreeSet;
 use std::rc::Rc;
+
+/// So many effects are looked at, each as often as it may happen.
+const EFFECTS: usize = 500;
 
 /// Names are shared: drafts are copied far more often than they are changed.
 pub(super) type Link = (usize, Rc<str>, usize);
@@ -44,7 +48,9 @@ pub(super) struct Draft {
     pub(super) nodes: Rc<Vec<(Rc<str>, Rc<str>)>>,
     pub(super) links: Rc<BTreeSet<Link>>,
     pub(super) absent: Rc<BTreeSet<Link>>,
-    pub(super) values: Rc<BTreeMap<(Owner, Rc<str>), Value>>,
+    /// What values must meet.
+    asked: Rc<Vec<Asked>>,
+    pub(super) values: Rc<Values>,
 }
 
 impl Draft {
@@ -104,33 +110,74 @@ impl Draft {
         self.words()
     }
 
-    /// With a number for each attribute of the match that the effects reckon with and nothing else asks for: a rule
-    /// cannot be applied where one is missing.
-    pub(super) fn with_numbers_for(mut self, effects: &[Effect], places: &Places) -> Self {
-        let mut expressions: Vec<&Expression> = Vec::new();
-        let mut effects: Vec<&Effect> = effects.iter().collect();
-        while let Some(effect) = effects.pop() {
+    /// With values that meet all that is asked, if any were found.
+    pub(super) fn with_values(mut self, schema: Option<&Schema>) -> Option<Self> {
+        if self.asked.is_empty() {
+            return Some(self);
+        }
+        let links = &self.links;
+        let nowhere = |key: &Key| matches!(&key.0, Owner::Link(link) if !links.contains(link));
+        self.values = Rc::new(values(&self.asked, schema, &nowhere)?);
+        Some(self)
+    }
+
+    /// Asks that what effects assign has a value: a rule cannot be applied where one has none.
+    pub(super) fn with_effects(
+        mut self,
+        effects: &[Effect],
+        places: &Places,
+        types: &Types,
+    ) -> Self {
+        let mut open: Vec<(&Effect, Places)> = Vec::new();
+        open.extend(effects.iter().map(|effect| (effect, places.clone())));
+        let mut left = EFFECTS;
+        while let (Some((effect, places)), Some(rest)) = (open.pop(), left.checked_sub(1)) {
+            left = rest;
             match effect {
-                Effect::Assign { value, .. } => expressions.push(value),
-                Effect::Forall { body, .. } | Effect::When { body, .. } => effects.extend(body),
+                Effect::Assign { value, .. } => {
+                    let (operator, holds) = (Comparison::Equal, true);
+                    let both = [value, value].map(|side| Term::of(side, &places));
+                    if let [Some(one), Some(other)] = both {
+                        let sides = [one, other];
+                        self = self
+                            .clone()
+                            .with_asked(operator, sides, holds)
+                            .unwrap_or(self);
+                    }
+                }
+                Effect::Forall { variables, body } => {
+                    for places in self.choices(variables, &places, types) {
+                        open.extend(body.iter().map(|effect| (effect, places.clone())));
+                    }
+                }
+                Effect::When { body, .. } => {
+                    open.extend(body.iter().map(|effect| (effect, places.clone())));
+                }
                 _ => {}
             }
         }
-        while let Some(expression) = expressions.pop() {
-            match expression {
-                Expression::Literal(_) => {}
-                Expression::Arithmetic { operands, .. } => expressions.extend(operands),
-                Expression::Attribute(path) => {
-                    if let Some(owner) = owner(path, places)
-                        && !self.values.contains_key(&owner)
-                    {
-                        let with = self.clone().with_value(owner, Value::I64(1));
-                        self = with.into_iter().next().unwrap_or(self);
-                    }
-                }
-            }
-        }
         self
+    }
+
+    /// Nodes that there are for quantified variables.
+    fn choices(&self, variables: &[PatternNode], places: &Places, types: &Types) -> Vec<Places> {
+        let mut all = vec![places.clone()];
+        for variable in variables {
+            let name: Rc<str> = Rc::from(&*variable.variable);
+            let fits = |exact: &str| types.is_subtype(exact, &variable.type_name);
+            let nodes = || self.nodes.iter().enumerate();
+            let fitting = || nodes().filter(|(_, (_, exact))| fits(exact));
+            let with = |places: &Places, node| {
+                let mut places = places.clone();
+                places.insert(&name, node);
+                places
+            };
+            let next = all
+                .iter()
+                .flat_map(|p| fitting().map(|(node, _)| with(p, node)));
+            all = next.take(EFFECTS).collect();
+        }
+        all
     }
 
     /// A name that no node has yet.
@@ -147,6 +194,11 @@ impl Draft {
         let node = (Rc::from(name), Rc::from(type_name));
         Rc::make_mut(&mut self.nodes).push(node);
         self.nodes.len() - 1
+    }
+
+    /// Gives a node a narrower type.
+    pub(super) fn narrow(&mut self, node: usize, type_name: &str) {
+        Rc::make_mut(&mut self.nodes)[node].1 = Rc::from(type_name);
     }
 
     /// Draws a link, or that it is not there; whether that goes with what is drawn.
@@ -168,18 +220,34 @@ impl Draft {
         Vec::from_iter(goes.then_some(self))
     }
 
-    pub(super) fn with_value(mut self, owner: (Owner, Rc<str>), value: Value) -> Vec<Self> {
-        match self.values.get(&owner) {
-            Some(known) if *known != value => return Vec::new(),
-            _ => {}
+    /// Asks that a comparison comes out one way or the other, unless it is known that it cannot.
+    pub(super) fn with_asked(
+        mut self,
+        operator: Comparison,
+        sides: [Term; 2],
+        holds: bool,
+    ) -> Option<Self> {
+        let asked = Asked {
+            operator,
+            sides,
+            holds,
+        };
+        if let Some(met) = asked.is_met(&|_| Err(Unknown)) {
+            return met.then_some(self);
         }
-        if let Owner::Link(link) = &owner.0
-            && !self.add_link(link.clone(), true)
-        {
-            return Vec::new();
+        if holds {
+            for key in asked.keys() {
+                if let Owner::Link(link) = &key.0
+                    && !self.add_link(link.clone(), true)
+                {
+                    return None;
+                }
+            }
         }
-        Rc::make_mut(&mut self.values).insert(owner, value);
-        vec![self]
+        if !self.asked.contains(&asked) {
+            Rc::make_mut(&mut self.asked).push(asked);
+        }
+        Some(self)
     }
 }
 

@@ -156,6 +156,30 @@ impl<'r> Facts<'r> {
         both.then(|| format!("`{}` would have to be there and not", words()))
     }
 
+    /// Whether the link is there, if that is known.
+    pub(super) fn known_link(&self, (from, label, to): (Node, &str, Node)) -> Option<bool> {
+        self.links.get(&(from, label, to)).copied()
+    }
+
+    /// Whether a comparison of what has these keys holds, if that is known of just these two.
+    pub(super) fn known_comparison(
+        &self,
+        operator: Comparison,
+        [one, other]: [String; 2],
+    ) -> Option<bool> {
+        let (key, operator) = if one <= other {
+            ((one, other), operator)
+        } else {
+            ((other, one), mirrored(operator))
+        };
+        let may = self.pairs.get(&key)?.may;
+        let wanted = relations(operator);
+        if may & wanted == 0 {
+            return Some(false);
+        }
+        (may & !wanted == 0).then_some(true)
+    }
+
     /// A comparison that holds or not; why that cannot be.
     pub(super) fn compare(
         &mut self,

@@ -15,6 +15,7 @@ mod never;
 mod order;
 mod reach;
 mod unused;
+mod values;
 
 pub use conflict::{CONFLICT_LIMIT, Conflict, Conflicts, EFFORT_LIMIT, OVERLAY_LIMIT, Undecided};
 
@@ -103,13 +104,15 @@ impl Grammar {
     /// applied the second does not match there any more. A rule can disable another match of
     /// itself.
     ///
-    /// The graph is the smallest overlay of the two left sides, completed by what preconditions ask for. At most
-    /// [`OVERLAY_LIMIT`] ways to lay one over the other are looked at. No more than [`CONFLICT_LIMIT`] are given. All
+    /// The graph is one of the smallest overlays of the two left sides, completed by what must hold for the second not to
+    /// match after the first; values are such as the schema allows. A pair that is neither given nor told as undecided was
+    /// shown to be no conflict, as far as types inherit from each other by the grammar.
+    ///
+    /// At most [`OVERLAY_LIMIT`] ways to lay one over the other are looked at. No more than [`CONFLICT_LIMIT`] are given. All
     /// together may take no more than `effort`, of which each pair of rules has an equal share at first (at least 5,000,000 as long as there is any); what some
-    /// leave is for the others. With [`EFFORT_LIMIT`] that is at most some ten seconds. Of which pairs it was not
-    /// found out is told.
-    pub fn conflicts(&self, effort: u64) -> Conflicts {
-        conflict::conflicts(self, effort)
+    /// leave is for the others. With [`EFFORT_LIMIT`] that is at most some ten seconds.
+    pub fn conflicts(&self, schema: Option<&Schema>, effort: u64) -> Conflicts {
+        conflict::conflicts(self, schema, effort)
     }
 }
 

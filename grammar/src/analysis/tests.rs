@@ -2,17 +2,13 @@
 #![allow(clippy::needless_raw_string_hashes, reason = "expect-test writes them")]
 
 use crate::testing::oracle::Model;
-use crate::testing::random::{AWKWARD, FEW, Words, soup};
+use crate::testing::random::{AWKWARD, FEW, soup};
 use crate::testing::repair::repaired;
 use crate::testing::{CARE, care_centre, read};
-use crate::{
-    Condition, Defects, Diagnostic, Grammar, Name, PatternNode, Problem, Rule, parse_grammar,
-};
-use dsr::{Graph, Schema, Time};
+use crate::{Defects, Diagnostic, Problem, parse_grammar};
+use dsr::Schema;
 use expect_test::{Expect, expect};
 use proptest::prelude::*;
-use proptest::strategy::ValueTree;
-use proptest::test_runner::TestRunner;
 
 fn check(diagnostics: Vec<Diagnostic>, expected: &Expect) {
     expected.assert_eq(&Defects { diagnostics }.to_string());
@@ -215,258 +211,6 @@ proptest! {
     }
 }
 
-/// One label and one type, so that every graph of three nodes can be tried.
-const ONE: Words = Words {
-    variables: &["a", "b"],
-    types: &["thing"],
-    labels: &["on"],
-    attributes: &["n"],
-    any_literal: false,
-};
-
-/// Every graph of up to `most` nodes.
-fn every_graph(most: usize) -> Vec<Model> {
-    let mut all = Vec::new();
-    for count in 0..=most {
-        for bits in 0..1_u32 << (count * count) {
-            let mut model = Model::default();
-            let name = |index: usize| format!("n{index}");
-            for index in 0..count {
-                model.nodes.insert(name(index), "thing".to_owned());
-            }
-            for pair in (0..count * count).filter(|pair| bits & (1 << pair) != 0) {
-                let link = (name(pair / count), "on".to_owned(), name(pair % count));
-                model.links.insert(link);
-            }
-            all.push(model);
-        }
-    }
-    all.sort_by_key(|model| (model.nodes.len(), model.links.len()));
-    all
-}
-
-/// Nodes and links.
-type Size = (usize, usize);
-
-/// The size of the smallest graph where the first rule disables the second, by trying.
-fn tried(models: &[Model], first: &Rule, second: &Rule) -> Option<Size> {
-    let found = models.iter().find(|model| {
-        let of = |rule: &Rule| -> Vec<_> {
-            let all = model.assignments(rule).into_iter();
-            all.filter(|at| model.rule_holds(rule, at)).collect()
-        };
-        let seconds = of(second);
-        of(first).iter().any(|one| {
-            let Some(after) = model.applied(first, one) else {
-                return false;
-            };
-            seconds.iter().any(|two| {
-                let other = first.name != second.name || one != two;
-                let there = two.values().all(|node| after.nodes.contains_key(node));
-                other && !(there && after.rule_holds(second, two))
-            })
-        })
-    });
-    found.map(|model| (model.nodes.len(), model.links.len()))
-}
-
-/// `(on x y)` of the variables of a rule and one that is quantified over, or that it is not.
-fn literal() -> impl Strategy<Value = Condition> {
-    let variable = || prop::sample::select(vec!["a", "b", "q"]);
-    (variable(), variable(), any::<bool>()).prop_map(|(from, to, there)| {
-        let link = Condition::Edge {
-            label: "on".into(),
-            from: from.into(),
-            to: to.into(),
-        };
-        if there {
-            link
-        } else {
-            Condition::Not(Box::new(link))
-        }
-    })
-}
-
-/// A quantifier over two literals.
-fn quantified() -> impl Strategy<Value = Condition> {
-    (literal(), literal(), 0..4, 0..4).prop_map(|(one, other, shape, quantifier)| {
-        let body = Box::new(match shape {
-            0 => one,
-            1 => Condition::And(vec![one, other]),
-            2 => Condition::Or(vec![one, other]),
-            _ => Condition::When {
-                condition: Box::new(one),
-                consequence: Box::new(other),
-            },
-        });
-        let variables = vec![PatternNode::new("q", "thing")];
-        let whole = if quantifier % 2 == 0 {
-            Condition::Exists { variables, body }
-        } else {
-            Condition::Forall { variables, body }
-        };
-        if quantifier < 2 {
-            whole
-        } else {
-            Condition::Not(Box::new(whole))
-        }
-    })
-}
-
-/// Two rules, with conditions or without.
-fn pair(condition: impl Strategy<Value = Option<Condition>>) -> impl Strategy<Value = Grammar> {
-    let body = (ONE.pattern(2, 2), ONE.pattern(2, 2), condition);
-    prop::collection::vec((ONE.rule(), body), 2).prop_map(|rules| {
-        let mut grammar = read("name=x\n===\n");
-        for (index, (rule, (left, right, precondition))) in rules.into_iter().enumerate() {
-            let mut rule = Rule {
-                left,
-                right,
-                precondition,
-                ..rule
-            };
-            rule.parameters.clear();
-            rule.effect.clear();
-            let mut rule = repaired(rule);
-            rule.name = Name::from(format!("r{index}").as_str());
-            grammar.rules.push(rule);
-        }
-        grammar
-    })
-}
-
-proptest! {
-    #![proptest_config(crate::testing::cases(60))]
-
-    #[test]
-    fn critical_pairs_are_those_of_every_small_graph(grammar in pair(Just(None))) {
-        for (shown, smallest) in sizes(&grammar, &every_graph(3)) {
-            prop_assert_eq!(shown, smallest);
-        }
-    }
-
-}
-
-#[test]
-fn critical_pairs_through_quantifiers_are_found_in_nearly_all_small_graphs() {
-    let mut runner = TestRunner::deterministic();
-    let strategy = pair(quantified().prop_map(Some));
-    let models = every_graph(3);
-    let (mut all, mut missed, mut larger) = (0, 0, 0);
-    for _ in 0..200 {
-        let grammar = strategy.new_tree(&mut runner).unwrap().current();
-        for (shown, smallest) in sizes(&grammar, &models) {
-            all += usize::from(smallest.is_some());
-            missed += usize::from(smallest.is_some() && shown.is_none());
-            larger += usize::from(smallest.is_some() && shown > smallest);
-        }
-    }
-    assert!(
-        all > 100 && 50 * missed < all && 50 * larger < all,
-        "{all} {missed} {larger}"
-    );
-}
-
-/// By pair of rules, the sizes of the graph that a conflict is shown with and of the smallest of the models
-/// where there is one.
-fn sizes(grammar: &Grammar, models: &[Model]) -> Vec<(Option<Size>, Option<Size>)> {
-    let found = grammar.conflicts(crate::EFFORT_LIMIT).found;
-    let mut sizes = Vec::new();
-    for first in &grammar.rules {
-        for second in &grammar.rules {
-            let conflict = found
-                .iter()
-                .find(|c| *first.name == *c.first && *second.name == *c.second);
-            let shown = conflict.map(|conflict| {
-                let mut graph = Graph::in_memory(Schema::open());
-                graph
-                    .commit(&conflict.graph, "test", Time::default())
-                    .unwrap();
-                let model = Model::of_graph(&graph);
-                // The oracle agrees that it is one.
-                assert!(
-                    tried(std::slice::from_ref(&model), first, second).is_some(),
-                    "{first}{second}"
-                );
-                (model.nodes.len(), model.links.len())
-            });
-            sizes.push((shown, tried(models, first, second)));
-        }
-    }
-    sizes
-}
-
-#[test]
-fn many_rules_are_compared_by_what_they_have_in_common() {
-    // Each pair of neighbours shares a label; all share their types.
-    let rule = |index: usize| {
-        let next = index + 1;
-        format!(
-            "r{index} : active(1) {{ {{ a:t b:t c:t a->b(l{index}) b->c(m) }} => \
-             {{ a:t b:t c:t a->b(l{next}) b->c(m) }} }}\n"
-        )
-    };
-    let text = "name=x\n===\n".to_owned() + &(0..400).map(rule).collect::<String>();
-    let conflicts = read(&text).conflicts(crate::EFFORT_LIMIT);
-    assert_eq!(conflicts.left, 0);
-    let of = |c: &super::Conflict| (c.first.clone(), c.second.clone());
-    let pairs: Vec<_> = conflicts.found.iter().map(of).collect();
-    let itself = |index: usize| (format!("r{index}"), format!("r{index}"));
-    assert_eq!(pairs, (0..400).map(itself).collect::<Vec<_>>());
-}
-
-#[test]
-fn rules_with_quantifiers_are_all_compared() {
-    let labels = ["in", "at", "holds", "near", "on"];
-    let rule = |index: usize| {
-        let (kept, made) = (labels[index % 5], labels[(index / 2 + 1) % 5]);
-        let none = labels[(index / 3 + 2) % 5];
-        let nodes = "r:robot a:room b:room p:person o:object";
-        let links = format!("a->b(door) p->a(in) o->a({kept})");
-        format!(
-            "r{index} : active(1) {{ {{ {nodes} r->a(in) {links} }} => {{ {nodes} r->b(in) {links} r->o({made}) }}\n\
-             precondition {{ (and (forall q:person (when (near r q) (> q.trust {index})))\n\
-             (not (exists t:object ({none} t a)))) }}\n\
-             effect {{ (forall q:person (when (near r q) (not (near r q)))) (assign r.n (- r.n 1)) }} }}\n"
-        )
-    };
-    let text = "name=x\n===\n".to_owned() + &(0..6).map(rule).collect::<String>();
-    let conflicts = read(&text).conflicts(crate::EFFORT_LIMIT / 4);
-    assert_eq!((conflicts.left, conflicts.undecided), (0, Vec::new()));
-    // `r2` and `r3` never match: they ask for a link and that there is none. Leaving a room disables whoever else would leave
-    // it, unless one forbids what the other has.
-    let pairs = conflicts
-        .found
-        .iter()
-        .map(|c| format!("{} {}", c.first, c.second));
-    let pairs: Vec<String> = pairs.collect();
-    expect!["r0 r0, r0 r1, r0 r4, r0 r5, r1 r0, r1 r1, r1 r4, r1 r5, r4 r0, r4 r1, r4 r4, r4 r5, r5 r0, r5 r1, r5 r4, r5 r5"].assert_eq(&pairs.join(", "));
-}
-
-#[test]
-fn what_is_too_much_to_compare_is_counted() {
-    // Everything can be laid over everything, and nothing is disabled; so that all is tried.
-    let words = |word: fn(usize) -> String| (1..9).map(word).collect::<Vec<_>>().join(" ");
-    let nodes = words(|index| format!("n{index}:t"));
-    let links = words(|index| format!("n1->n{index}(l)"));
-    let rule = |index: usize| {
-        format!(
-            "r{index} : active(1) {{ {{ {nodes} {links} }} => {{ {nodes} {links} }}\n\
-             precondition {{ (forall a:t b:t c:t d:t (when (and (l a b) (l c d)) (> a.n b.n))) }}\n\
-             effect {{ (assign n1.n 1) }} }}\n"
-        )
-    };
-    let text = "name=x\n===\n".to_owned() + &(0..20).map(rule).collect::<String>();
-    let conflicts = read(&text).conflicts(crate::EFFORT_LIMIT / 100);
-    // Each pair has its share: none is left to the last ones only.
-    assert!(conflicts.left > 0);
-    let (first, second, why) = &conflicts.undecided[0];
-    assert_eq!(
-        (&**first, &**second, *why),
-        ("r0", "r0", crate::Undecided::Effort)
-    );
-}
-
 proptest! {
     #![proptest_config(crate::testing::cases(300))]
 
@@ -476,7 +220,7 @@ proptest! {
             let (grammar, _) = parse_grammar(&text, "soup");
             let _ = grammar.analyse(None);
             let _ = grammar.unreachable(&care_centre().snapshot()).unwrap();
-            for conflict in grammar.conflicts(crate::EFFORT_LIMIT / 100).found.into_iter().take(3) {
+            for conflict in grammar.conflicts(None, crate::EFFORT_LIMIT / 100).found.into_iter().take(3) {
                 prop_assert!(!conflict.graph.operations.is_empty());
             }
             for rule in grammar.all_rules() {

@@ -72,7 +72,8 @@ impl Datum {
 
     fn to_value(&self) -> Value {
         match self {
-            Self::Number(number) => (*number as i64).into(),
+            Self::Number(number) if number.fract() == 0.0 => (*number as i64).into(),
+            Self::Number(number) => (*number).into(),
             Self::Text(text) => text.as_str().into(),
             Self::Truth(truth) => (*truth).into(),
         }

@@ -7,19 +7,18 @@
 mod compose;
 mod consistent;
 mod regress;
-mod rename;
 #[cfg(test)]
 mod tests;
 mod whole;
 
 use crate::parser::Finding;
+use crate::rename::Renaming;
 use crate::{
     Binding, Combo, ComboStep, Constant, Expression, Goal, Grammar, Name, PatternEdge, Problem,
     Rule,
 };
 use compose::{Composition, Impossible};
 use dsr::{ReadError, Snapshot};
-use rename::Renaming;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// How many steps of one combo may be optional: each doubles the rules it stands for.

@@ -4,6 +4,7 @@
 //! own, provided that the steps between do what the [`Composition`] says.
 
 use super::compose::{Composition, Impossible, Node, Outcome, attribute, impossible};
+use crate::formula::{all, any, constant, negated, no};
 use crate::{AttributePath, Condition, Effect, Expression, Name, PatternNode, Rule};
 use std::collections::BTreeSet;
 
@@ -148,59 +149,6 @@ pub(super) fn footprint(rule: &Rule) -> Footprint {
     rule.duration.iter().for_each(|d| footprint.expression(d));
     rule.effect.iter().for_each(|e| footprint.effect(e, false));
     footprint
-}
-
-fn yes() -> Condition {
-    Condition::And(Vec::new())
-}
-
-fn no() -> Condition {
-    Condition::Or(Vec::new())
-}
-
-fn constant(holds: bool) -> Condition {
-    if holds { yes() } else { no() }
-}
-
-fn all(conditions: Vec<Condition>) -> Condition {
-    let mut flat = Vec::new();
-    for condition in conditions {
-        match condition {
-            Condition::And(inner) => flat.extend(inner),
-            never if never == no() => return no(),
-            other => flat.push(other),
-        }
-    }
-    if flat.len() == 1 {
-        flat.remove(0)
-    } else {
-        Condition::And(flat)
-    }
-}
-
-fn any(conditions: Vec<Condition>) -> Condition {
-    let mut flat = Vec::new();
-    for condition in conditions {
-        match condition {
-            Condition::Or(inner) => flat.extend(inner),
-            always if always == yes() => return yes(),
-            other => flat.push(other),
-        }
-    }
-    if flat.len() == 1 {
-        flat.remove(0)
-    } else {
-        Condition::Or(flat)
-    }
-}
-
-fn negated(condition: Condition) -> Condition {
-    match condition {
-        Condition::Not(inner) => *inner,
-        always if always == yes() => no(),
-        never if never == no() => yes(),
-        other => Condition::Not(Box::new(other)),
-    }
 }
 
 /// Quantified variables that stand for a node of the rule here.

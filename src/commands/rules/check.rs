@@ -130,8 +130,8 @@ pub(super) fn check(
     }
     diagnostics.extend(analysed);
     let found = match (conflicts, as_json) {
-        (true, _) => grammar.conflicts(grammar::EFFORT_LIMIT),
-        (false, true) => grammar.conflicts(UNASKED_EFFORT),
+        (true, _) => grammar.conflicts(schema.as_ref(), grammar::EFFORT_LIMIT),
+        (false, true) => grammar.conflicts(schema.as_ref(), UNASKED_EFFORT),
         (false, false) => Conflicts::default(),
     };
     let shown = found.found.iter();

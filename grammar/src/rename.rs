@@ -7,7 +7,7 @@ use crate::{AttributePath, Condition, Effect, Expression, Name, Pattern, Pattern
 use std::collections::BTreeSet;
 
 /// Old names and new ones, innermost last.
-pub(super) struct Renaming<'a> {
+pub(crate) struct Renaming<'a> {
     scope: Vec<(Name, Name)>,
     taken: &'a mut BTreeSet<String>,
     alias: &'a str,
@@ -15,7 +15,7 @@ pub(super) struct Renaming<'a> {
 
 impl<'a> Renaming<'a> {
     /// `scope` renames what the rule binds or creates by its sides; `taken` are all new names.
-    pub(super) fn new(
+    pub(crate) fn new(
         scope: Vec<(Name, Name)>,
         taken: &'a mut BTreeSet<String>,
         alias: &'a str,
@@ -27,7 +27,12 @@ impl<'a> Renaming<'a> {
         }
     }
 
-    pub(super) fn rule(&mut self, rule: &Rule) -> Rule {
+    /// All names that were given, old and new.
+    pub(crate) fn into_names(self) -> Vec<(Name, Name)> {
+        self.scope
+    }
+
+    pub(crate) fn rule(&mut self, rule: &Rule) -> Rule {
         Rule {
             left: self.pattern(&rule.left),
             right: self.pattern(&rule.right),
@@ -80,7 +85,7 @@ impl<'a> Renaming<'a> {
         }
     }
 
-    fn quantify(&mut self, variables: &[PatternNode]) -> Vec<PatternNode> {
+    pub(crate) fn quantify(&mut self, variables: &[PatternNode]) -> Vec<PatternNode> {
         let renamed = |node: &PatternNode| PatternNode {
             variable: self.declare(&node.variable),
             ..node.clone()
@@ -88,7 +93,7 @@ impl<'a> Renaming<'a> {
         variables.iter().map(renamed).collect()
     }
 
-    fn condition(&mut self, condition: &Condition) -> Condition {
+    pub(crate) fn condition(&mut self, condition: &Condition) -> Condition {
         match condition {
             Condition::Edge { label, from, to } => Condition::Edge {
                 label: label.clone(),
@@ -132,7 +137,7 @@ impl<'a> Renaming<'a> {
         }
     }
 
-    fn expression(&self, expression: &Expression) -> Expression {
+    pub(crate) fn expression(&self, expression: &Expression) -> Expression {
         match expression {
             Expression::Literal(_) => expression.clone(),
             Expression::Attribute(path) => Expression::Attribute(self.path(path)),
@@ -143,7 +148,7 @@ impl<'a> Renaming<'a> {
         }
     }
 
-    fn path(&self, path: &AttributePath) -> AttributePath {
+    pub(crate) fn path(&self, path: &AttributePath) -> AttributePath {
         let mut path = path.clone();
         match &mut path {
             AttributePath::Node { variable, .. } => *variable = self.name(variable),
