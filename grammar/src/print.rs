@@ -253,6 +253,7 @@ impl Display for Literal {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         match self {
             Self::Integer(value) => value.fmt(f),
+            Self::Large(value) => value.fmt(f),
             // Debug keeps the point or exponent that tells it from an integer.
             Self::Real(value) => write!(f, "{value:?}"),
             Self::Text(text) => f.write_str(&quote(text)),

@@ -261,6 +261,7 @@ impl Expression {
     pub fn as_number(&self) -> Option<f64> {
         match self {
             Self::Literal(Literal::Integer(value)) => Some(*value as f64),
+            Self::Literal(Literal::Large(value)) => Some(*value as f64),
             Self::Literal(Literal::Real(value)) => Some(*value),
             _ => None,
         }
@@ -272,6 +273,8 @@ impl Expression {
 pub enum Literal {
     /// Digits without point or exponent.
     Integer(i64),
+    /// The same, beyond the largest `i64`.
+    Large(u64),
     /// Digits with point or exponent; always finite.
     Real(f64),
     /// Text in quotes.
@@ -281,10 +284,23 @@ pub enum Literal {
 }
 
 impl Literal {
+    /// A number as it is written; `None` where it is whole and beyond what any value can be.
+    pub(crate) fn number(text: &str) -> Option<Self> {
+        let whole = text
+            .bytes()
+            .all(|byte| byte.is_ascii_digit() || byte == b'-');
+        if !whole {
+            return text.parse().ok().map(Self::Real);
+        }
+        let small = text.parse().map(Self::Integer);
+        small.or_else(|_| text.parse().map(Self::Large)).ok()
+    }
+
     /// The value.
     pub fn value(&self) -> dsr::Value {
         match self {
             Self::Integer(value) => (*value).into(),
+            Self::Large(value) => (*value).into(),
             Self::Real(value) => (*value).into(),
             Self::Text(text) => text.as_str().into(),
             Self::Boolean(value) => (*value).into(),

@@ -5,7 +5,7 @@
 
 use super::{DEPTH_LIMIT, Parser};
 use crate::lexer::TokenKind;
-use crate::{AttributePath, Literal, Name, PatternNode, Problem, Span};
+use crate::{AttributePath, Name, PatternNode, Problem, Span};
 use std::ops::Range;
 
 /// A formula whose brackets are paired and whose words have no meaning yet.
@@ -13,8 +13,8 @@ use std::ops::Range;
 pub(super) enum Form {
     List(Vec<Form>, Span),
     Word(Name),
-    /// A number that can also name a node, or cannot.
-    Number(Literal, Name),
+    /// A number, which can also name a node if it is digits.
+    Number(Name),
     Text(Name),
     Typed(PatternNode),
     Path(AttributePath, Span),
@@ -24,7 +24,7 @@ impl Form {
     pub(super) fn span(&self) -> Span {
         match self {
             Self::List(_, span) | Self::Path(_, span) => *span,
-            Self::Word(name) | Self::Number(_, name) | Self::Text(name) => name.span(),
+            Self::Word(name) | Self::Number(name) | Self::Text(name) => name.span(),
             Self::Typed(node) => node.variable.span().to(node.type_name.span()),
         }
     }
@@ -77,12 +77,12 @@ impl Parser<'_> {
                 self.maybe_path(name, Form::Word)
             }
             TokenKind::Number => {
-                let literal = self.literal_number()?;
+                self.number("a number")?;
                 let name = Name::new(&self.text[token.range.clone()], self.span(token.range));
                 if self.is_digits(at) {
-                    return self.maybe_path(name, |name| Form::Number(literal, name));
+                    return self.maybe_path(name, Form::Number);
                 }
-                Some(Form::Number(literal, name))
+                Some(Form::Number(name))
             }
             TokenKind::Text => {
                 let name = self.bump_name();
@@ -135,15 +135,6 @@ impl Parser<'_> {
                 break;
             }
         }
-    }
-
-    fn literal_number(&mut self) -> Option<Literal> {
-        let text = self.token_text(self.at);
-        let (value, _) = self.number("a number")?;
-        Some(
-            text.parse::<i64>()
-                .map_or(Literal::Real(value), Literal::Integer),
-        )
     }
 
     fn maybe_path(&mut self, variable: Name, otherwise: impl FnOnce(Name) -> Form) -> Option<Form> {

@@ -86,7 +86,7 @@ impl Parser<'_> {
         let span = form.span();
         if let Form::List(mut items, _) = form
             && !items.is_empty()
-            && let Form::Word(head) | Form::Number(_, head) = items.remove(0)
+            && let Form::Word(head) | Form::Number(head) = items.remove(0)
         {
             return Some((head, items, span));
         }
@@ -164,7 +164,7 @@ impl Parser<'_> {
         let is_node = |form: &Form| match form {
             Form::Word(name) => !matches!(&**name, "true" | "false"),
             Form::Text(_) => self.names == NodeNames::Goal,
-            Form::Number(_, name) => name.chars().all(char::is_alphanumeric),
+            Form::Number(name) => name.chars().all(char::is_alphanumeric),
             _ => false,
         };
         let word = |form: &Form| matches!(form, Form::Word(_)) && is_node(form);
@@ -277,7 +277,10 @@ impl Parser<'_> {
     fn expression(&mut self, form: Form) -> Option<Expression> {
         match form {
             Form::Path(path, _) => Some(Expression::Attribute(path)),
-            Form::Number(literal, _) => Some(Expression::Literal(literal)),
+            Form::Number(name) => {
+                let place = name.span();
+                self.number_literal(place.start..place.end)
+            }
             Form::Text(name) => Some(Expression::Literal(Literal::Text(unquote(&name)))),
             Form::Word(word) if word == "true" || word == "false" => {
                 Some(Expression::Literal(Literal::Boolean(word == "true")))
@@ -406,7 +409,7 @@ impl Parser<'_> {
     fn is_node_form(&self, form: &Form) -> bool {
         match form {
             Form::Word(name) => name.chars().all(|c| c.is_alphanumeric() || c == '_'),
-            Form::Number(_, name) => name.chars().all(char::is_alphanumeric),
+            Form::Number(name) => name.chars().all(char::is_alphanumeric),
             Form::Text(_) => self.names == NodeNames::Goal,
             _ => false,
         }
@@ -414,9 +417,7 @@ impl Parser<'_> {
 
     fn node_form(&mut self, form: &Form) -> Option<Name> {
         match form {
-            Form::Word(name) | Form::Number(_, name) | Form::Text(name)
-                if self.is_node_form(form) =>
-            {
+            Form::Word(name) | Form::Number(name) | Form::Text(name) if self.is_node_form(form) => {
                 Some(name.clone())
             }
             _ => {

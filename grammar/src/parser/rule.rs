@@ -11,6 +11,10 @@ use crate::{
 };
 use std::ops::Range;
 
+/// Which whole numbers a value can be.
+const WHOLE: &str =
+    "from -9223372036854775808 to 18446744073709551615 (a real has a point or an exponent)";
+
 /// Words that may stand before a rule's name.
 pub(super) const MODIFIERS: [&str; 3] = ["dormant", "hierarchical", "strict"];
 /// Words that may stand between a rule's cost and its body.
@@ -232,11 +236,16 @@ impl Parser<'_> {
         if value < 0.0 {
             self.out_of_range(range.clone(), what, "0 or more");
         }
-        let text = &self.text[range];
-        Some(Expression::Literal(match text.parse::<i64>() {
-            Ok(integer) => Literal::Integer(integer),
-            Err(_) => Literal::Real(value),
-        }))
+        self.number_literal(range)
+    }
+
+    /// The number that is written there.
+    pub(super) fn number_literal(&mut self, place: Range<usize>) -> Option<Expression> {
+        let literal = Literal::number(&self.text[place.clone()]);
+        if literal.is_none() {
+            self.out_of_range(place, "a whole number", WHOLE);
+        }
+        literal.map(Expression::Literal)
     }
 
     fn out_of_range(&mut self, place: Range<usize>, what: &'static str, range: &'static str) {

@@ -3,9 +3,85 @@
 
 use crate::testing::random::{AWKWARD, soup};
 use crate::testing::{CARE, read};
-use crate::{Defects, Types, parse_goal, parse_grammar};
+use crate::{Binding, Defects, Types, parse_goal, parse_grammar};
+use dsr::{Graph, Schema, Time, Transaction, Value};
 use expect_test::expect;
 use proptest::prelude::*;
+
+#[test]
+fn whole_numbers_are_exact_from_the_least_to_the_largest() {
+    let schema = "open = true\n[attributes]\nn = { kind = \"u64\", index = true }\n";
+    let schema = Schema::from_toml("schema", schema).unwrap();
+    for number in [u64::MAX, u64::MAX - 1, 1 << 63, i64::MAX as u64] {
+        let text = format!(
+            "r : active({number}) {{ {{ a:t }} => {{ a:t }} \
+             precondition {{ (= a.n {number}) }} effect {{ (assign a.m {number}) }} }}\n"
+        );
+        let grammar = read(&format!("name=x\n===\n{text}"));
+        assert_eq!(grammar.analyse(None).len(), 0);
+        let rule = &grammar.rules[0];
+        assert_eq!(
+            read(&grammar.to_string()).rules[0].precondition,
+            rule.precondition
+        );
+        assert!(rule.to_string().contains(&format!("(assign a.m {number})")));
+        let mut graph = Graph::in_memory(schema.clone());
+        let mut world = Transaction::new();
+        for value in [number, number - 1] {
+            let name = value.to_string();
+            world.create_node("t", &name, vec![]);
+            world.set(name.as_str(), "n", value);
+        }
+        graph.commit(&world, "test", Time::default()).unwrap();
+        let snapshot = graph.snapshot();
+        let found = grammar.matches(&snapshot, rule, &Binding::new()).unwrap();
+        let found: Vec<Binding> = found.map(Result::unwrap).collect();
+        let node = snapshot
+            .find_node_by_name(&number.to_string())
+            .unwrap()
+            .unwrap();
+        assert_eq!(found.len(), 1);
+        assert_eq!(found[0].get("a"), Some(node.id()));
+        let operations = grammar.apply(&snapshot, "r", &found[0]).unwrap();
+        let change = Transaction {
+            operations,
+            ..Transaction::new()
+        };
+        graph.commit(&change, "test", Time::default()).unwrap();
+        let snapshot = graph.snapshot();
+        let node = snapshot.find_node(node.id()).unwrap().unwrap();
+        let value = node.value("m").unwrap().unwrap();
+        let as_i64 = i64::try_from(number).map(Value::I64);
+        assert_eq!(value, as_i64.unwrap_or(Value::U64(number)));
+    }
+    let least = read(
+        "name=x\n===\nr : active(1) { { a:t } => { a:t } precondition { (> a.n -9223372036854775808) } }\n",
+    );
+    assert!(least.to_string().contains("(> a.n -9223372036854775808)"));
+}
+
+#[test]
+fn whole_numbers_beyond_all_values_are_refused_at_their_place() {
+    for number in ["18446744073709551616", "-9223372036854775809"] {
+        let text = format!(
+            "name=x\n===\nr : active(1) {{ {{ a:t }} => {{ a:t }} precondition {{ (> a.n {number}) }} }}\n"
+        );
+        let (_, defects) = parse_grammar(&text, "test.aggl");
+        let told = defects[0].to_string();
+        assert!(
+            told.starts_with("a whole number must be from -9223372036854775808"),
+            "{told}"
+        );
+        assert!(told.ends_with(&format!("not {number}")), "{told}");
+        assert_eq!(&text[defects[0].span.start..defects[0].span.end], number);
+        // With a point it is a real, and digits name a node.
+        let text = text.replace(number, &format!("{number}.0"));
+        assert_eq!(parse_grammar(&text, "test.aggl").1.len(), 0);
+    }
+    let long =
+        "name=x\n===\nr : active(1) { { 18446744073709551616:t } => { 18446744073709551616:t } }\n";
+    assert_eq!(parse_grammar(long, "test.aggl").1.len(), 0);
+}
 
 #[test]
 fn a_rule_in_canonical_form() {

@@ -312,6 +312,7 @@ impl Model {
         match expression {
             Expression::Literal(literal) => Some(match literal {
                 Literal::Integer(value) => Datum::Number(*value as f64),
+                Literal::Large(value) => Datum::Number(*value as f64),
                 Literal::Real(value) => Datum::Number(*value),
                 Literal::Text(text) => Datum::Text(text.clone()),
                 Literal::Boolean(truth) => Datum::Truth(*truth),

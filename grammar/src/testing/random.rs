@@ -104,6 +104,7 @@ impl Words {
         }
         prop_oneof![
             any::<i64>().prop_map(Literal::Integer),
+            (i64::MAX as u64 + 1..=u64::MAX).prop_map(Literal::Large),
             any::<f64>()
                 .prop_filter("finite", |x| x.is_finite())
                 .prop_map(Literal::Real),
