@@ -74,6 +74,34 @@ const COAST: &str = "
   (:goal (and (at p elm1) (at q ash0) (at r ash1) (at s oak0))))";
 
 #[test]
+fn tasks_of_the_competitions_cost_what_other_planners_prove() {
+    // By A* with the landmark-cut heuristic of Fast Downward.
+    let tasks = [
+        (
+            include_str!("../testing/competition/elevators-domain.pddl"),
+            include_str!("../testing/competition/elevators-problem.pddl"),
+            33.0,
+        ),
+        (
+            include_str!("../testing/competition/rovers-domain.pddl"),
+            include_str!("../testing/competition/rovers-problem.pddl"),
+            16.0,
+        ),
+    ];
+    for (domain, problem, cost) in tasks {
+        for effort in [Effort::Optimal, Effort::Anytime] {
+            let planned = outcome(domain, problem, effort);
+            assert_eq!((planned.cost, planned.optimal), (Some(cost), true));
+        }
+        let first = outcome(domain, problem, Effort::First);
+        assert!(
+            first.cost.is_some_and(|first| first <= 1.5 * cost),
+            "{first:?}"
+        );
+    }
+}
+
+#[test]
 fn the_best_plan_is_proved_with_few_states() {
     let planned = outcome(BARGE, COAST, Effort::Optimal);
     assert!(planned.optimal);
