@@ -5,6 +5,7 @@
 use crate::metrics::mapped;
 use crate::scenario::Scenario;
 use crate::scenes::Frame;
+use crate::world::{Whereabouts, whereabouts};
 use agents::social_mapping::rejection::Rejection;
 use agents::social_mapping::scene::{Activity, BODY_RADIUS, Manner, Person, SceneError};
 use agents::social_mapping::{
@@ -108,19 +109,24 @@ impl Situation {
         }
     }
 
-    /// A scenario at a time of its day, with everybody where they are at its start.
+    /// A scenario at a time of its day, with everybody where their schedules have them, as [`whereabouts`] says.
     pub fn of_scenario(scenario: &Scenario, now: Time) -> Self {
-        let people = scenario.people.iter().map(|person| Person {
-            name: person.name.clone(),
-            world_from_person: person.pose,
-            velocity: Vector2::zeros(),
-            radius: person.radius,
-            manner: Manner {
-                room: scenario
-                    .find_room(person.pose.translation.vector.into())
-                    .map(|room| room.name.clone()),
-                ..Manner::default()
-            },
+        let found = whereabouts(scenario, now);
+        let people = scenario.people.iter().zip(found);
+        let people = people.filter_map(|(person, found)| {
+            let Whereabouts { pose, velocity } = found?;
+            Some(Person {
+                name: person.name.clone(),
+                world_from_person: pose,
+                velocity,
+                radius: person.radius,
+                manner: Manner {
+                    room: scenario
+                        .find_room(pose.translation.vector.into())
+                        .map(|room| room.name.clone()),
+                    ..Manner::default()
+                },
+            })
         });
         let held = scenario.activities.iter().filter(|one| !one.cancelled);
         let activities = held.map(|activity| Activity {

@@ -13,6 +13,7 @@ mod random;
 mod route;
 #[cfg(test)]
 mod tests;
+mod timetable;
 mod walker;
 mod walking;
 
@@ -30,6 +31,7 @@ use random::stream;
 use route::FloorPlan;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
+pub use timetable::{Whereabouts, whereabouts};
 use walking::Disc;
 
 /// What reaches the world in one step.

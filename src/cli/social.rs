@@ -88,9 +88,9 @@ pub(crate) enum SocialAction {
 pub(crate) struct SocialPicture {
     /// A recording of people frame by frame (JSON), or a scenario's folder
     pub(crate) file: PathBuf,
-    /// When: a recording's last frame until this time, or a time of the scenario's day, HH:MM
-    /// [default: the start]
-    #[arg(long, value_name = "TIME")]
+    /// When: a recording's last frame until this time, or a time of the scenario's day, HH:MM, which moves R(t), and
+    /// people to where their schedules have them [default: the start]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     pub(crate) at: Option<String>,
     /// Where to; the ending decides what
     #[arg(long, value_name = "FILE")]

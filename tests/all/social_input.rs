@@ -72,6 +72,10 @@ fn what_cannot_be_used_is_refused_with_what_could() {
             "not a time",
         ),
         (
+            &["social", "map", &file, "--at", "-x", "--out", "map.svg"],
+            "`-x` is not a time of a recording",
+        ),
+        (
             &["social", "schedule", &broken, "--instance", "nobody-here"],
             "no instance `nobody-here` is running",
         ),
@@ -136,4 +140,28 @@ fn names_in_settings_that_nothing_has_are_told_with_the_nearest() {
         err.contains("`coking` is none; did you mean `cooking`?"),
         "{err}"
     );
+}
+
+#[test]
+fn a_time_of_the_day_moves_people_and_a_negative_one_of_a_recording_is_a_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = |of: &str, at: &str| {
+        let out = folder.path().join("map.svg");
+        let out = out.to_str().unwrap().to_owned();
+        let (code, told, err) = cortex(&["social", "density", of, "--at", at, "--out", &out]);
+        assert_eq!(code, 0, "{err}");
+        (told, fs::read_to_string(out).unwrap())
+    };
+    let people = recording(&folder, false);
+    assert!(map(&people, "-5").0.contains("t = 1: people 3"));
+    let care_centre = root().join("scenarios/care-centre");
+    let care_centre = care_centre.to_str().unwrap();
+    let drawn = |at: &str| {
+        let text = map(care_centre, at).1;
+        text.replace(&format!("{at}:00"), "")
+    };
+    // The television's space claims as much at both times.
+    assert_ne!(drawn("10:45"), drawn("10:46"));
+    let (told, _) = map(care_centre, "06:00");
+    assert!(told.contains("people are where they are then"), "{told}");
 }

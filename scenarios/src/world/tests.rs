@@ -56,7 +56,7 @@ pose = [11.0, 0.5, 3.1]
 schedule = [{ at = "10:00:01", go = [3.0, 1.0], face = "ana" }]
 "#;
 
-fn scenario() -> Scenario {
+pub(super) fn scenario() -> Scenario {
     let read = |_: &str| Ok(String::new());
     Scenario::parse("scenario.toml", SCENARIO, &read).expect("a good scenario")
 }

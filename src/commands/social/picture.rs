@@ -12,7 +12,7 @@ use scenarios::Scenario;
 use scenarios::picture::{Show, png, social};
 use scenarios::scenario::parse_social;
 use scenarios::scenes::parse_recording;
-use scenarios::situation::Situation;
+use scenarios::situation::{self, Situation};
 use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::Arc;
@@ -44,7 +44,7 @@ pub(super) fn run(
             "name a .yaml file with `--out`",
         ));
     }
-    let (situation, config) = situation(arguments)?;
+    let (situation, config, mut notes) = situation(arguments)?;
     let (mut update, mapper) = situation
         .map(&config)
         .map_err(|error| refused(&arguments.file, error))?;
@@ -78,9 +78,10 @@ pub(super) fn run(
             "{too_dear} cells cost more than {DEAREST}, the most that this scale has, and are written as that"
         );
     }
-    for rejection in &update.rejected {
+    notes.extend(update.rejected.iter().map(ToString::to_string));
+    for note in &notes {
         // Writing to a string does not fail.
-        let _ = writeln!(text, "{rejection}");
+        let _ = writeln!(text, "{note}");
     }
     print(&text)?;
     Ok(Answer::Yes)
@@ -101,8 +102,8 @@ fn with_flags(mut config: SocialConfig, arguments: &Arguments) -> SocialConfig {
     config
 }
 
-/// A recording's frame, or a scenario at a time, with the figures of social mapping.
-fn situation(arguments: &Arguments) -> Result<(Situation, SocialConfig), Failure> {
+/// A recording's frame, or a scenario at a time, with the figures of social mapping, and what the picture does not show.
+fn situation(arguments: &Arguments) -> Result<(Situation, SocialConfig, Vec<String>), Failure> {
     let file = &arguments.file;
     if file.is_dir() {
         let scenario: Scenario = crate::commands::load_scenario(file)?;
@@ -112,8 +113,9 @@ fn situation(arguments: &Arguments) -> Result<(Situation, SocialConfig), Failure
             None => scenario.start,
         };
         let situation = Situation::of_scenario(&scenario, now);
+        let notes = unseen(&scenario, now);
         let config = with_flags(settings.unwrap_or(scenario.social), arguments);
-        return Ok((situation, config));
+        return Ok((situation, config, notes));
     }
     let settings = settings(arguments, None)?;
     let text = crate::commands::read_text(file)?;
@@ -135,7 +137,27 @@ fn situation(arguments: &Arguments) -> Result<(Situation, SocialConfig), Failure
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
     // How far the picture goes is decided by them.
     let config = with_flags(settings.unwrap_or_default(), arguments);
-    Ok((Situation::of_frame(&name, frame, &config), config))
+    let situation = Situation::of_frame(&name, frame, &config);
+    Ok((situation, config, Vec::new()))
+}
+
+/// What a scenario's schedules do not tell of a time.
+fn unseen(scenario: &Scenario, now: Time) -> Vec<String> {
+    let mut notes = Vec::new();
+    if now < scenario.start {
+        let start = situation::time_of_day(scenario.start);
+        notes.push(format!(
+            "the scenario starts at {start}: people are where they are then"
+        ));
+    }
+    if !scenario.streams.is_empty() {
+        let names: Vec<&str> = scenario.streams.iter().map(|s| s.name.as_str()).collect();
+        notes.push(format!(
+            "the people of {} are not shown: where they are is up to chance",
+            names.join(", ")
+        ));
+    }
+    notes
 }
 
 /// The figures of the file that `--settings` names, where it names one; rooms and objects are those of the scenario.
