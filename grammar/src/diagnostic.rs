@@ -238,6 +238,12 @@ pub enum Problem {
         /// Why.
         reason: String,
     },
+    /// A combo of which the steps are a rule only without optional ones.
+    #[error("this combo is never applied with all its steps: {reason}")]
+    NeverWhole {
+        /// Why.
+        reason: String,
+    },
     /// A rule whose left side and precondition hold in no graph.
     #[error("this rule never matches: {reason}")]
     NeverMatches {
@@ -302,6 +308,7 @@ impl Problem {
             | Self::TypeNotRead { .. }
             | Self::UndeclaredParent { .. }
             | Self::NotUnfolded { .. }
+            | Self::NeverWhole { .. }
             | Self::NeverMatches { .. }
             | Self::UnusedVariable { .. }
             | Self::BeyondManifest { .. }

@@ -277,6 +277,45 @@ fn nesting_has_a_limit() {
 }
 
 #[test]
+fn a_misspelt_keyword_or_an_open_rule_hides_no_include() {
+    check(
+        "name=x\n===\ntyps\n{\n(room)\n}\n===\nr : active(1)\n{\n{ a:room }\n=>\n{ a:rom\n\ninclud(one.aggl)\n\
+         s : active(1) { { a:room } => { a:room } precondition { (and (l a a) } }\ninclude(two.aggl)\n",
+        &expect![[r#"
+            f.aggl:3:1: error: expected a rule, `include(path)`, `types` or the end, found `typs` (did you mean `types`?)
+            f.aggl:12:1: error: `{` is never closed
+            f.aggl:12:5: warning: no type `rom` in the files that could be read: one that is missing may declare it (did you mean `room`?)
+            f.aggl:14:1: error: expected a rule, `include(path)`, `types` or the end, found `includ` (did you mean `include`?)
+            f.aggl:14:8: error: cannot read the included file `one.aggl`: no other files are at hand
+            f.aggl:15:57: error: `(` is never closed
+            f.aggl:16:9: error: cannot read the included file `two.aggl`: no other files are at hand"#]],
+    );
+    // What stands in the middle of a rule is none.
+    let text =
+        "name=x\n===\nr : active(1)\n{\n{ a:include(3,4)\ninclude:t(1,2) }\n=>\n{ a:include }\n}\n";
+    check(text, &expect![[""]]);
+}
+
+#[test]
+fn a_combo_that_is_never_whole_is_told_where_it_breaks() {
+    let rules = "name=x\n===\ndrop : active(1) { { c:cup } => { } }\n\
+                 wash : active(1) { { c:cup } => { c:cup } effect { (assign c.clean true) } }\n";
+    check(
+        &format!(
+            "{rules}both : active(1) {{\ndrop as d optional\nwash as w\nwhere:\nd.c = w.c\n}}\n"
+        ),
+        &expect![
+            "f.aggl:7:9: warning: this combo is never applied with all its steps: step `w` uses `c`, which an earlier step deletes"
+        ],
+    );
+    // Without the optional step's node being the same, nothing is wrong.
+    check(
+        &format!("{rules}both : active(1) {{\ndrop as d optional\nwash as w\n}}\n"),
+        &expect![[""]],
+    );
+}
+
+#[test]
 fn included_files_are_read_once_and_missing_ones_are_told() {
     let mut asked = Vec::new();
     let (grammar, diagnostics) = load_grammar(

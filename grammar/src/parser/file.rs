@@ -115,7 +115,7 @@ impl Parser<'_> {
             let Some(token) = self.peek().cloned() else {
                 break;
             };
-            if self.is_word("include") && self.is_symbol_at(self.at + 1, "(") {
+            if self.is_keyword(self.at, "include", "(") {
                 parsed
                     .regions
                     .push(self.region(token.range.start, Part::Include));
@@ -125,7 +125,7 @@ impl Parser<'_> {
                 } else {
                     self.skip_to_item();
                 }
-            } else if self.is_word("types") && self.is_symbol_at(self.at + 1, "{") {
+            } else if self.is_keyword(self.at, "types", "{") {
                 parsed
                     .regions
                     .push(self.region(token.range.start, Part::Types));
@@ -183,9 +183,21 @@ impl Parser<'_> {
             .collect()
     }
 
+    /// Tells of a keyword that is misspelt, and takes it for what it was meant to be.
+    fn keyword(&mut self, keyword: &'static str) {
+        if !self.is_word(keyword) {
+            self.expected("a rule, `include(path)`, `types` or the end", &[keyword]);
+        }
+        self.bump();
+    }
+
     fn include(&mut self) -> Option<Name> {
-        self.bump();
-        self.bump();
+        let is_misspelt = !self.is_word("include");
+        self.keyword("include");
+        let opening = self.bump();
+        if is_misspelt {
+            return self.path_after(opening.end);
+        }
         if self
             .peek()
             .is_none_or(|token| token.kind != TokenKind::Path)
@@ -202,8 +214,26 @@ impl Parser<'_> {
         Some(name)
     }
 
+    /// The path from a place to the bracket on its line, which the lexer did not know to be one.
+    fn path_after(&mut self, start: usize) -> Option<Name> {
+        let rest = &self.text[start..];
+        let length = rest.find([')', '\n'])?;
+        let raw = &rest[..length];
+        let first = start + (raw.len() - raw.trim_start().len());
+        let path = raw.trim();
+        let name = Name::new(path, self.span(first..first + path.len()));
+        while self
+            .peek()
+            .is_some_and(|token| token.range.start < start + length)
+        {
+            self.bump();
+        }
+        self.eat(")");
+        (!path.is_empty()).then_some(name)
+    }
+
     fn types(&mut self, types: &mut Types) {
-        self.bump();
+        self.keyword("types");
         let opening = self.bump();
         self.limit = self
             .beginnings
@@ -266,9 +296,7 @@ impl Parser<'_> {
         self.bump();
         while self.at < next {
             let starts_line = self.peek().is_some_and(|token| token.first_on_line);
-            let item = (self.is_word("include") && self.is_symbol_at(self.at + 1, "("))
-                || (self.is_word("types") && self.is_symbol_at(self.at + 1, "{"));
-            if starts_line && item {
+            if starts_line && self.is_keyword(self.at, "types", "{") {
                 break;
             }
             self.bump();

@@ -1,6 +1,6 @@
 //! From tokens to the syntax tree, by recursive descent with recovery.
 //!
-//! Guarantee: a broken rule never hides the next one. The beginning of each rule is found before
+//! Guarantee: a broken rule never hides the next one, or an include. The beginning of each is found before
 //! anything is parsed, and no rule reads past the next beginning.
 
 mod file;
@@ -50,7 +50,7 @@ struct Parser<'a> {
     at: usize,
     /// Where the item being read must end: the next rule's beginning, or the end of the file.
     limit: usize,
-    /// Tokens that begin a rule beyond doubt, ascending.
+    /// Tokens that begin a rule or an include beyond doubt, ascending.
     beginnings: Vec<usize>,
     names: NodeNames,
     findings: Vec<Finding>,
@@ -89,7 +89,8 @@ impl<'a> Parser<'a> {
             parser.report(range, problem);
         }
         if names == NodeNames::Rule {
-            parser.beginnings = (0..limit).filter(|&at| parser.begins_rule(at)).collect();
+            let begins = |&at: &usize| parser.begins_rule(at) || parser.begins_include(at);
+            parser.beginnings = (0..limit).filter(begins).collect();
         }
         parser
     }
@@ -386,5 +387,20 @@ impl<'a> Parser<'a> {
             && matches!(self.token_text(at + 2), "active" | "passive")
             && (self.is_symbol_at(at + 3, "{")
                 || (self.is_symbol_at(at + 3, "(") && !self.is_symbol_at(at + 5, ",")))
+    }
+
+    fn begins_include(&self, at: usize) -> bool {
+        let follows = at
+            .checked_sub(1)
+            .is_some_and(|before| self.is_symbol_at(before, ":"));
+        self.tokens[at].first_on_line && !follows && self.is_keyword(at, "include", "(")
+    }
+
+    /// Whether the word and what follows it are `keyword` and this bracket, misspelt or not.
+    fn is_keyword(&self, at: usize, keyword: &str, bracket: &str) -> bool {
+        let word = self.token_text(at);
+        self.is_symbol_at(at + 1, bracket)
+            && self.tokens[at].kind == TokenKind::Word
+            && (word == keyword || suggest(word, [keyword]).is_some())
     }
 }

@@ -62,13 +62,14 @@ pub(crate) fn unfold(grammar: &Grammar) -> (Vec<Unfolded>, Vec<Finding>) {
     let mut unfolded: Vec<Unfolded> = Vec::new();
     let mut findings = Vec::new();
     for combo in &grammar.combos {
-        let mut report = |problem| {
+        let mut report_at = |at: &Name, problem| {
             findings.push(Finding {
-                span: combo.name.span(),
+                span: at.span(),
                 problem,
                 related: None,
             });
         };
+        let mut report = |problem| report_at(&combo.name, problem);
         let known = |step: &ComboStep| grammar.own_rule(&step.rule).is_some();
         if !combo.steps.iter().all(known) {
             // A step that is no rule is reported where it stands; one that is a combo is not.
@@ -88,7 +89,8 @@ pub(crate) fn unfold(grammar: &Grammar) -> (Vec<Unfolded>, Vec<Finding>) {
             report(Problem::NotUnfolded { reason });
             continue;
         }
-        let (mut some, mut reasons) = (false, Vec::new());
+        let mut some = false;
+        let mut first = None;
         for steps in choices(&combo.steps) {
             match variant(grammar, combo, &steps) {
                 Ok(rule) => {
@@ -99,13 +101,19 @@ pub(crate) fn unfold(grammar: &Grammar) -> (Vec<Unfolded>, Vec<Finding>) {
                         unfolded.push(rule);
                     }
                 }
-                Err(Impossible(reason)) if !reasons.contains(&reason) => reasons.push(reason),
-                Err(_) => {}
+                Err(Broken { reason, step }) => {
+                    let whole = steps.len() == combo.steps.len();
+                    first.get_or_insert((reason.0, step, whole));
+                }
             }
         }
-        // That a step does not fit some choice of the others is what makes it optional.
-        if !some && let Some(reason) = reasons.into_iter().next() {
-            report(Problem::NotUnfolded { reason });
+        // That a step does not fit some choice of the others is what makes it optional; the choice of all comes first.
+        match first {
+            Some((reason, ..)) if !some => report(Problem::NotUnfolded { reason }),
+            Some((reason, step, true)) => {
+                report_at(&combo.steps[step].alias, Problem::NeverWhole { reason });
+            }
+            _ => {}
         }
     }
     (unfolded, findings)
@@ -202,7 +210,14 @@ impl<'a> Classes<'a> {
     }
 }
 
-fn variant(grammar: &Grammar, combo: &Combo, steps: &[&ComboStep]) -> Result<Unfolded, Impossible> {
+/// Why chosen steps are no rule, and the place among them of the one that does not fit.
+struct Broken {
+    reason: Impossible,
+    step: usize,
+}
+
+fn variant(grammar: &Grammar, combo: &Combo, steps: &[&ComboStep]) -> Result<Unfolded, Broken> {
+    let at = |step| move |reason| Broken { reason, step };
     let classes = Classes::new(grammar, combo, steps);
     let mut taken: BTreeSet<String> = classes.classes.iter().map(|c| c.1.to_string()).collect();
     let mut composition = Composition::new(&grammar.types);
@@ -212,10 +227,11 @@ fn variant(grammar: &Grammar, combo: &Combo, steps: &[&ComboStep]) -> Result<Unf
         let Some(rule) = grammar.own_rule(&step.rule) else {
             continue;
         };
-        let variables = classes.of_step(index)?;
+        let variables = classes.of_step(index).map_err(at(index))?;
         let part = Renaming::new(variables.clone(), &mut taken, &step.alias).rule(rule);
         let last = index + 1 == steps.len();
-        composition.step(&part, &step.alias, last)?;
+        let made = composition.step(&part, &step.alias, last);
+        made.map_err(at(index))?;
         unfolded_steps.push(UnfoldedStep {
             rule: step.rule.clone(),
             alias: step.alias.clone(),
@@ -242,7 +258,7 @@ fn variant(grammar: &Grammar, combo: &Combo, steps: &[&ComboStep]) -> Result<Unf
             activates.push(name.clone());
         }
     }
-    let mut rule = composition.finish()?;
+    let mut rule = composition.finish().map_err(at(steps.len() - 1))?;
     rule.name = name;
     rule.kind = combo.kind;
     rule.cost = Expression::number(combo.cost);
