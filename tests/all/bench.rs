@@ -4,6 +4,7 @@
 use crate::support::Program;
 use serde_json::Value;
 use std::fs;
+use std::os::unix::fs::PermissionsExt;
 use tempfile::TempDir;
 
 #[test]
@@ -123,4 +124,24 @@ fn rules_are_not_measured_without_their_peers() {
         let told = told.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(told.contains(words), "{words}: {told}");
     }
+    // It lies in no folder of target files, so that cargo builds where it always does.
+    let cargo = folder.path().join("cargo");
+    let asked = folder.path().join("asked");
+    let script = format!("#!/bin/sh\necho \"$@\" > '{}'\nexit 101\n", asked.display());
+    fs::write(&cargo, script).unwrap();
+    fs::set_permissions(&cargo, fs::Permissions::from_mode(0o755)).unwrap();
+    let output = std::process::Command::new(&alone)
+        .args(["bench", "rules", "--json"])
+        .env("PATH", folder.path())
+        .output()
+        .unwrap();
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{told}");
+    assert!(told.contains("cargo ended with"), "{told}");
+    let asked = fs::read_to_string(asked).unwrap();
+    assert!(
+        asked.starts_with("build --quiet --package peers"),
+        "{asked}"
+    );
+    assert!(!asked.contains("--target-dir"), "{asked}");
 }

@@ -4,7 +4,7 @@
 use crate::Failure;
 use crate::commands::output::tell;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitStatus, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// What a peer found of one pattern.
@@ -19,38 +19,67 @@ pub(super) struct PeerFound {
 /// How long a peer may take for one pattern.
 const LIMIT: Duration = Duration::from_secs(20);
 
+/// What it is called.
+const PROGRAM: &str = "cortex-peers";
+
 /// The peers' program.
 pub(super) struct Peers(PathBuf);
 
-/// Builds the program into the folder of target files that `beside` lies in.
-fn build(beside: &Path) -> std::io::Result<ExitStatus> {
-    let folder = beside.parent();
-    let release = folder.and_then(Path::file_name) == Some("release".as_ref());
-    let mut cargo = Command::new("cargo");
-    cargo.args(["build", "--quiet", "--package", "peers"]);
-    if let Some(target) = folder.and_then(Path::parent) {
-        cargo.arg("--target-dir").arg(target);
+/// The folder of target files that cargo made for this program, if it is still there: one that it marked.
+fn target_folder(this: &Path) -> Option<&Path> {
+    let folder = this.parent()?.parent()?;
+    folder.join("CACHEDIR.TAG").is_file().then_some(folder)
+}
+
+/// Builds the program in the workspace that this one was built from, as this one was built, and beside it where that is
+/// a folder of target files. Gives the path, or why there is none.
+fn build(this: &Path) -> Result<PathBuf, String> {
+    let sources = Path::new(env!("CARGO_MANIFEST_DIR"));
+    if !sources.join("peers").is_dir() {
+        let sources = sources.display();
+        return Err(format!(
+            "the sources that this program is of, {sources}, are not there"
+        ));
     }
+    let mut cargo = Command::new("cargo");
     cargo
-        .args(release.then_some("--release"))
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .args(["build", "--quiet", "--package", "peers"])
+        .arg("--message-format=json-render-diagnostics")
+        .args((!cfg!(debug_assertions)).then_some("--release"))
+        .current_dir(sources)
         .stdin(Stdio::null())
-        .status()
+        .stderr(Stdio::inherit());
+    if let Some(folder) = target_folder(this) {
+        cargo.arg("--target-dir").arg(folder);
+    }
+    let output = cargo.output();
+    let output = output.map_err(|error| format!("cargo cannot be started: {error}"))?;
+    if !output.status.success() {
+        return Err(format!("cargo ended with {}", output.status));
+    }
+    let told = String::from_utf8_lossy(&output.stdout);
+    let built = told.lines().rev().find_map(|line| {
+        let message: serde_json::Value = serde_json::from_str(line).ok()?;
+        let is_it = message["target"]["name"] == PROGRAM;
+        is_it.then(|| message["executable"].as_str().map(PathBuf::from))?
+    });
+    built.ok_or_else(|| "cargo did not say where it is".to_owned())
 }
 
 impl Peers {
     /// Finds the program beside this one, or builds it in the workspace that this one was built from.
     pub(super) fn find() -> Result<Self, Failure> {
         let this = std::env::current_exe().map_err(Failure::internal)?;
-        let beside = this.with_file_name("cortex-peers");
+        let beside = this.with_file_name(PROGRAM);
         if beside.is_file() {
             return Ok(Self(beside));
         }
-        tell("building cortex-peers, which rules are measured beside\n");
-        let why = match build(&beside) {
-            Ok(status) if status.success() && beside.is_file() => return Ok(Self(beside)),
-            Ok(status) => format!("cargo ended with {status}"),
-            Err(error) => format!("cargo cannot be started: {error}"),
+        tell(&format!(
+            "building {PROGRAM}, which rules are measured beside\n"
+        ));
+        let why = match build(&this) {
+            Ok(built) => return Ok(Self(built)),
+            Err(why) => why,
         };
         let what = format!(
             "the program that rules are measured beside, {}, is not there and could not be built: {why}",
