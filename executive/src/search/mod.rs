@@ -25,7 +25,7 @@ use relaxed::Relaxed;
 /// What is asked of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Effort {
-    /// A plan fast: the first one found, made better with half as much work again.
+    /// A plan fast: the first one found, made better with about as much work again.
     First,
     /// The first, then better ones until the limit or until the best is proved.
     #[default]
@@ -164,14 +164,18 @@ pub fn search(task: &Task, effort: Effort, limits: &mut Limits<'_>) -> Answer {
         weight = schedule.next().or(weight);
     }
     if effort == Effort::First && !optimal {
-        best = windows::improve(task, &relaxed, &mut by_cost, best, polish, limits);
+        let piecewise = PIECEWISE * polish;
+        best = windows::improve(task, &relaxed, &mut by_cost, best, piecewise, limits);
     }
     limits.uncap();
     solved(task, best, optimal)
 }
 
-/// So many states are expanded at least to make a first plan better as a whole, and again piece by piece.
-const LEAST_POLISH: u64 = 350;
+/// So many states are expanded at least to make a first plan better as a whole.
+const LEAST_POLISH: u64 = 500;
+
+/// So many times that at the most piece by piece, which makes more of them.
+const PIECEWISE: u64 = 3;
 
 /// ... and so many at the most.
 const MOST_POLISH: u64 = 1000;
