@@ -23,8 +23,8 @@ pub struct SocialConfig {
     pub resolution: f64,
     /// People's density and zones. Preset `hall` with levels .9/.5/.1.
     pub proxemics: Proxemics,
-    /// Whether the space of walking people reaches further ahead on the grid, by
-    /// [`FourSided::walking`]. Polylines and metrics keep the standing shape.
+    /// Whether the space of walking people reaches further ahead, by [`FourSided::walking`]. Metrics keep the standing
+    /// shape.
     pub stretch: bool,
     /// What a place right beside an obstacle costs more than a free one. The default stays below
     /// the cheapest space of an object, so the order of READING.md item 7 holds; 0 turns it off.

@@ -47,7 +47,7 @@ pub fn extent(config: &SocialConfig, people: &[Person]) -> Option<[f64; 4]> {
     let levels = &config.proxemics.levels;
     let mut outline: Vec<Point2<f64>> = Vec::new();
     for person in &sound {
-        let shape = shape_of(config, person, &[], true);
+        let shape = shape_of(config, person, &[]);
         let pose = &person.world_from_person;
         outline.extend(shape.contour(pose, levels.social, EXTENT_POINTS));
     }

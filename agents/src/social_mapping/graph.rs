@@ -82,7 +82,7 @@ pub enum StepError {
 }
 
 /// What to write so that the graph shows `update`: a person's three polylines where the person
-/// moved by more than 5 cm or 5 degrees since they were written, an object's space where a point of
+/// moved by more than 5 cm or 5 degrees, or their space grew or shrank so much to a side, since they were written, an object's space where a point of
 /// it moved by more than 5 cm, R(t) to the hundredth. Polylines of whom the map does not have are
 /// removed.
 ///
@@ -205,18 +205,28 @@ fn flat(polyline: &[Point2<f64>]) -> Value {
 }
 
 /// Whether two outlines of a zone are of the same shape at about the same pose. A contour starts at
-/// the person's right and has the left half way round, so it tells its person's pose.
+/// the person's right and has the left half way round, so it tells its person's pose; what is furthest ahead and behind
+/// lies half way between the two.
 fn is_same_zone(old: &[Point2<f64>], new: &[Point2<f64>]) -> bool {
-    let sides = |ring: &[Point2<f64>]| Some((*ring.first()?, *ring.get(ring.len() / 2)?));
-    let (Some((old_right, old_left)), Some((right, left))) = (sides(old), sides(new)) else {
+    let quarters = |ring: &[Point2<f64>]| {
+        let at = |quarter: usize| ring.get(quarter * ring.len() / 4).copied();
+        Some([at(0)?, at(1)?, at(2)?, at(3)?])
+    };
+    let (Some([old_right, old_front, old_left, old_rear]), Some([right, front, left, rear])) =
+        (quarters(old), quarters(new))
+    else {
         return old.is_empty() && new.is_empty();
     };
     let (was, is) = (old_left - old_right, left - right);
-    let moved = (left + right.coords).coords / 2.0 - (old_left + old_right.coords).coords / 2.0;
+    let (old_middle, middle) = (old_right + was / 2.0, right + is / 2.0);
+    let reaches = [(old_front, front), (old_rear, rear)];
     old.len() == new.len()
-        && moved.norm() <= MOVED
+        && (middle - old_middle).norm() <= MOVED
         && was.perp(&is).atan2(was.dot(&is)).abs() <= TURNED
         && (was.norm() - is.norm()).abs() <= MOVED
+        && reaches
+            .iter()
+            .all(|(was, is)| ((was - old_middle).norm() - (is - middle).norm()).abs() <= MOVED)
 }
 
 fn is_near(old: &[Point2<f64>], new: &[Point2<f64>]) -> bool {

@@ -51,10 +51,8 @@ pub struct PersonSpaces {
     pub name: String,
     /// Where the polylines were drawn.
     pub world_from_person: Isometry2<f64>,
-    /// The widths of the density, standing, as the outlines show it.
+    /// The widths of the density, as grid and outlines have it.
     pub shape: FourSided,
-    /// The widths on the grid, with what walking adds.
-    pub moving: FourSided,
     /// Whether the robot passes between the person and the walls ahead, to the left, behind and to the
     /// right, where the configuration has space give way to walls (FD IV-C).
     pub passages: Option<[Passage; 4]>,
@@ -257,7 +255,7 @@ impl SocialMapper {
             stamps.extend(spaces.get(at).map(|spaces| {
                 Stamp::Zones {
                     world_from_person: spaces.world_from_person,
-                    shape: spaces.moving,
+                    shape: spaces.shape,
                     cuts,
                     open: spaces.open.clone(),
                     shut: spaces
@@ -395,7 +393,7 @@ impl SocialMapper {
     fn spaces_of(&self, person: &Person, scene: &SocialScene) -> PersonSpaces {
         let levels = &self.config.proxemics.levels;
         let pose = &person.world_from_person;
-        let shape = shape_of(&self.config, person, &scene.walls, false);
+        let shape = shape_of(&self.config, person, &scene.walls);
         let contour = |level| shape.contour(pose, level, self.config.contour_points);
         let task = person.manner.task.as_ref();
         let open = task.and_then(|task| self.config.cooperation.get(task));
@@ -403,7 +401,6 @@ impl SocialMapper {
             name: person.name.clone(),
             world_from_person: *pose,
             shape,
-            moving: shape_of(&self.config, person, &scene.walls, true),
             passages: passages_of(&self.config, person, &scene.walls),
             open: open.cloned().unwrap_or_default(),
             intimate: contour(levels.intimate),

@@ -76,20 +76,20 @@ pub(super) fn cooperation() -> BTreeMap<String, Vec<CooperationZone>> {
 }
 
 /// What a person does: as is known of them, else as is usual in the room that they are in (AP 2.1).
-pub(super) fn activity_of<'a>(config: &'a SocialConfig, manner: &'a Manner) -> Option<&'a String> {
+pub fn activity_of<'a>(config: &'a SocialConfig, manner: &'a Manner) -> Option<&'a String> {
     let by_room = || config.activity_in.get(manner.room.as_ref()?);
     manner.activity.as_ref().or_else(by_room)
 }
 
-/// A person's widths where they stand; `moving` adds what walking does. Activities that the
+/// A person's widths where they stand or walk: the one shape of grid, outlines and pictures. Activities that the
 /// configuration does not know leave the usual shape.
-pub fn shape_of(config: &SocialConfig, person: &Person, walls: &[Wall], moving: bool) -> FourSided {
+pub fn shape_of(config: &SocialConfig, person: &Person, walls: &[Wall]) -> FourSided {
     let usual = FourSided::from(config.proxemics.shape);
     let mut shape = activity_of(config, &person.manner)
         .and_then(|name| config.activities.get(name))
         .copied()
         .unwrap_or(usual);
-    if moving && config.stretch {
+    if config.stretch {
         let own = person.world_from_person.rotation.inverse() * person.velocity;
         shape = shape.walking(own.x);
     }
@@ -117,7 +117,7 @@ mod tests {
         Person {
             name: "ana".into(),
             world_from_person: Isometry2::identity(),
-            velocity: Vector2::new(1.0, 0.0),
+            velocity: Vector2::zeros(),
             radius: BODY_RADIUS,
             manner,
         }
@@ -126,15 +126,19 @@ mod tests {
     #[test]
     fn what_somebody_does_and_feels_shapes_their_space() {
         let config = SocialConfig::default();
-        let usual = shape_of(&config, &person(Manner::default()), &[], false);
+        let usual = shape_of(&config, &person(Manner::default()), &[]);
         assert_eq!(usual, FourSided::HALL);
-        let walking = shape_of(&config, &person(Manner::default()), &[], true);
+        let walks = Person {
+            velocity: Vector2::new(1.0, 0.0),
+            ..person(Manner::default())
+        };
+        let walking = shape_of(&config, &walks, &[]);
         assert!((walking.front - 1.5).abs() < 1e-12);
         let cook = Manner {
             activity: Some("cooking".into()),
             ..Manner::default()
         };
-        let cooking = shape_of(&config, &person(cook), &[], false);
+        let cooking = shape_of(&config, &person(cook), &[]);
         assert_eq!(cooking.sides().map(|s| (s * 10.0) as i32), [5, 15, 5, 15]);
         let mut config = config;
         let room = Some("kitchen".to_owned());
@@ -143,19 +147,19 @@ mod tests {
             ..manner
         };
         config.activity_in = [("kitchen".to_owned(), "cooking".to_owned())].into();
-        let by_room = shape_of(&config, &person(in_kitchen(Manner::default())), &[], false);
+        let by_room = shape_of(&config, &person(in_kitchen(Manner::default())), &[]);
         assert_eq!(by_room, cooking);
         let stands = in_kitchen(Manner {
             activity: Some("standing".into()),
             ..Manner::default()
         });
-        let standing = shape_of(&config, &person(stands), &[], false);
+        let standing = shape_of(&config, &person(stands), &[]);
         assert_eq!(standing, config.activities["standing"]);
         let happy = Manner {
             features: config.features.parse("emotional_state=happy").unwrap(),
             ..Manner::default()
         };
-        let happy = shape_of(&config, &person(happy), &[], false);
+        let happy = shape_of(&config, &person(happy), &[]);
         assert!(happy.front < usual.front && happy.left < usual.left);
     }
 
@@ -164,9 +168,9 @@ mod tests {
         let wall = [Point2::new(1.65, -3.0), Point2::new(1.65, 3.0)];
         let mut config = SocialConfig::default();
         let ana = person(Manner::default());
-        assert_eq!(shape_of(&config, &ana, &[wall], false), FourSided::HALL);
+        assert_eq!(shape_of(&config, &ana, &[wall]), FourSided::HALL);
         config.walls = Some(WallAdaptation::default());
-        let narrow = shape_of(&config, &ana, &[wall], false);
+        let narrow = shape_of(&config, &ana, &[wall]);
         assert!((narrow.front - 0.8f64.powf(0.976) / 1.2).abs() < 1e-9);
         let [front, left, ..] = passages_of(&config, &ana, &[wall]).unwrap();
         assert!(matches!(front, Passage::Adapted { .. }) && left == Passage::Free);

@@ -4,6 +4,7 @@
 
 mod cells;
 mod key;
+mod known;
 mod passing;
 
 use super::canvas::{self, INK, PEOPLE, View, heat, number, text};
@@ -21,7 +22,7 @@ use svg::node::element::{Group, Rectangle};
 const MAP: [f64; 2] = [820.0, 720.0];
 const TITLE: f64 = 46.0;
 const BORDER: f64 = 20.0;
-/// Width of the legend, px.
+/// Least width of the legend, px.
 const WIDTH: f64 = 216.0;
 /// Points of an outline.
 const OUTLINE: usize = 72;
@@ -48,9 +49,10 @@ pub fn social(situation: &Situation, update: &Update, config: &SocialConfig, sho
     let view = View::new(situation.scene.bounds, 0.0, [BORDER, TITLE + BORDER], MAP);
     let [map_width, map_height] = view.size();
     let left = BORDER + map_width + BORDER;
-    let (column, column_height) =
+    let (column, [column_width, column_height]) =
         key::column([left, TITLE + BORDER], situation, update, config, show);
-    let width = number(left + WIDTH + BORDER);
+    let whole = left + column_width.max(WIDTH) + BORDER;
+    let width = number(whole);
     let below = column_height.max(map_height + canvas::SCALE_BAR);
     let height = number(TITLE + BORDER + below + BORDER);
     let clip = svg::node::element::ClipPath::new()
@@ -60,7 +62,9 @@ pub fn social(situation: &Situation, update: &Update, config: &SocialConfig, sho
         .set("width", "100%")
         .set("height", "100%")
         .set("fill", "#ffffff");
-    let heading = text(BORDER, BORDER + 16.0, &situation.name, 20.0)
+    let letters = (whole - 2.0 * BORDER) / canvas::text_width("m", 22.0);
+    let name = known::short(&situation.name, letters as usize);
+    let heading = text(BORDER, BORDER + 16.0, &name, 20.0)
         .set("font-weight", "bold")
         .set("fill", INK);
     let what = match show {
@@ -142,7 +146,7 @@ fn map(
     if is_crowd(update) {
         label_objects(view, update, &mut labels, |_| true);
     } else {
-        group = group.add(people(view, update, situation, &mut labels));
+        group = group.add(people(view, update, situation, config, &mut labels));
         let least = |one: &ObjectUse| curve(config, one).least;
         label_objects(view, update, &mut labels, |one| one.usage > least(one));
         label_groups(view, update, &mut labels);
@@ -164,7 +168,7 @@ fn label_objects(
             colour: INK,
             bold: false,
         };
-        let words = format!("{} R = {:.2}", one.name, one.usage);
+        let words = format!("{} R = {:.2}", known::short(&one.name, 34), one.usage);
         let centre = view.page(one.world_from_object.translation.vector.into());
         let corners = one.space.iter().map(|corner| corner.coords);
         let middle = corners.sum::<Vector2<f64>>() / one.space.len().max(1) as f64;
@@ -361,7 +365,13 @@ fn walls(view: &View, situation: &Situation) -> Group {
 }
 
 /// Bodies with an arrow where they face.
-fn people(view: &View, update: &Update, situation: &Situation, labels: &mut Labels) -> Group {
+fn people(
+    view: &View,
+    update: &Update,
+    situation: &Situation,
+    config: &SocialConfig,
+    labels: &mut Labels,
+) -> Group {
     let spaces = &update.people;
     let mut group = Group::new();
     for found in update.groups.iter() {
@@ -400,7 +410,11 @@ fn people(view: &View, update: &Update, situation: &Situation, labels: &mut Labe
                 bold: false,
             };
             let centre = Point2::from(person.world_from_person.translation.vector);
-            labels.beside(view.page(centre), view.px(0.25), &person.name, look);
+            let (centre, radius) = (view.page(centre), view.px(0.25));
+            let words = known::label(&person.name, situation, config);
+            if !labels.beside(centre, radius, &words, look) {
+                labels.beside(centre, radius, &person.name, look);
+            }
         }
     }
     group

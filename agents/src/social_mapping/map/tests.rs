@@ -235,7 +235,7 @@ fn the_robot_does_not_pass_between_two_who_talk_unless_it_must() {
 }
 
 #[test]
-fn the_space_of_a_walking_person_reaches_ahead_on_the_grid_only() {
+fn the_space_of_a_walking_person_reaches_ahead_on_the_grid_and_in_its_outline() {
     let mut scene = hall();
     scene.people.push(person("ana", pose(5.0, 5.05, FRAC_PI_2)));
     let standing = update(&scene);
@@ -244,7 +244,12 @@ fn the_space_of_a_walking_person_reaches_ahead_on_the_grid_only() {
     assert_cost(&standing, 5.0, 7.35, FREE);
     assert_cost(&walking, 5.0, 7.35, 2.0);
     assert_cost(&walking, 5.0, 5.05 + 0.65, BLOCKED);
-    assert_eq!(standing.people[0].personal, walking.people[0].personal);
+    // The outline is the edge of what the grid has: a cell further, another zone.
+    let edge = walking.people[0].personal.iter().map(|p| p.y);
+    let edge = edge.fold(f64::NEG_INFINITY, f64::max);
+    assert!((edge - (5.05 + 1.6 * (-2.0 * 0.5f64.ln()).sqrt())).abs() < 1e-9);
+    assert_cost(&walking, 5.0, edge - 0.1, 4.0);
+    assert_cost(&walking, 5.0, edge + 0.1, 2.0);
     let config = SocialConfig {
         stretch: false,
         ..SocialConfig::default()
@@ -254,6 +259,7 @@ fn the_space_of_a_walking_person_reaches_ahead_on_the_grid_only() {
         .update(noon(), &scene)
         .unwrap();
     assert_eq!(plain.grid, standing.grid);
+    assert_eq!(plain.people[0].personal, standing.people[0].personal);
 }
 
 #[test]

@@ -1,16 +1,17 @@
 //! The column beside the picture of a situation: what its colours and lines mean. It explains nothing
 //! that is not drawn.
 
-use super::super::canvas::{FAINT, INK, PEOPLE, heat, line, number, rectangle, text};
-use super::{GROUP, Show, cost_colour, curve, density_colour, is_crowd, passing};
+use super::super::canvas::{FAINT, INK, PEOPLE, heat, line, number, rectangle, text, text_width};
+use super::{GROUP, Show, cost_colour, curve, density_colour, is_crowd, known, passing};
 use crate::situation::Situation;
 use agents::social_mapping::{SocialConfig, Update, UsageCurve};
+use std::cell::Cell;
 use svg::node::element::Group;
 
 /// From line to line, px.
 const LINE: f64 = 20.0;
 
-/// The column with its upper left corner at `corner`, px, and its height.
+/// The column with its upper left corner at `corner`, px, and its width and height.
 #[allow(clippy::too_many_lines, reason = "a column is read from top to bottom")]
 pub(super) fn column(
     corner: [f64; 2],
@@ -18,14 +19,20 @@ pub(super) fn column(
     update: &Update,
     config: &SocialConfig,
     show: Show,
-) -> (Group, f64) {
+) -> (Group, [f64; 2]) {
     let [left, top] = corner;
+    let widest = Cell::new(0.0f64);
     let mut y = top + 8.0;
     let mut column = Group::new();
     let words = |x: f64, y: f64, content: &str, colour: &'static str| {
+        widest.set(widest.get().max(x + text_width(content, 12.0)));
         text(left + x, y, content, 12.0).set("fill", colour)
     };
-    let heading = |y: f64, content: &str| words(0.0, y, content, INK).set("font-weight", "bold");
+    let heading = |y: f64, content: &str| {
+        // Bold letters are wider.
+        widest.set(widest.get().max(text_width(content, 14.0)));
+        words(0.0, y, content, INK).set("font-weight", "bold")
+    };
     let bar = |y: f64, colour: &dyn Fn(f64) -> String, ends: [&str; 2]| {
         const STEPS: u32 = 30;
         let piece = 150.0 / f64::from(STEPS);
@@ -161,6 +168,16 @@ pub(super) fn column(
             .add(words(40.0, y, "personal space of a group", INK));
         y += LINE;
     }
+    let known = known::lines(situation, config);
+    if !crowd && !known.is_empty() {
+        y += 6.0;
+        column = column.add(heading(y, "Known of people"));
+        for known in &known {
+            y += 16.0;
+            column = column.add(words(0.0, y, known, INK));
+        }
+        y += LINE;
+    }
     if !update.objects.is_empty() {
         y += 6.0;
         let ends = usage_ends(update, config);
@@ -189,7 +206,7 @@ pub(super) fn column(
         column = column.add(words(0.0, y, "nobody and nothing is here", FAINT));
         y += LINE;
     }
-    (column, y - top)
+    (column, [widest.get(), y - top])
 }
 
 /// What the ends of the colours of R(t) are: numbers where all objects have the same, words where not.

@@ -267,3 +267,23 @@ fn a_cancelled_activity_claims_nothing() {
     centre.turn(&mut agent, noon() + 0.4);
     assert!((usage(&centre) - 2.5).abs() < 0.011);
 }
+
+#[test]
+fn the_outlines_of_who_walks_reach_ahead_as_the_grid_does() {
+    let (mut centre, mut agent) = (Centre::new(), agent());
+    centre.turn(&mut agent, noon());
+    let ahead = |centre: &Centre| {
+        let zone = centre.value("ana", ZONES[1]).unwrap();
+        let (points, _) = zone.as_f64s().unwrap().as_chunks::<2>();
+        let far = points.iter().map(|[x, _]| x - 5.0);
+        far.fold(f64::NEG_INFINITY, f64::max)
+    };
+    let standing = ahead(&centre);
+    centre.set("ana", "velocity", [1.0, 0.0]);
+    let (_, written) = centre.turn(&mut agent, noon() + 0.1);
+    assert_eq!(written, POLYLINES[..3]);
+    assert!((ahead(&centre) / standing - 1.5).abs() < 1e-9);
+    // A hair faster is no other shape.
+    centre.set("ana", "velocity", [1.02, 0.0]);
+    assert_eq!(centre.turn(&mut agent, noon() + 0.2).1, [""; 0]);
+}
