@@ -46,6 +46,17 @@ fn at(x: f64, y: f64, heading: f64) -> Unicycle {
 }
 
 #[test]
+fn near_somebody_who_stands_the_speed_grows_with_the_gap() {
+    let near = |gap| speed_near(gap, 0.7);
+    assert!((near(-0.1) - 0.25).abs() < 1e-12 && (near(0.6) - 0.475).abs() < 1e-12);
+    assert!((near(1.2) - 0.7).abs() < 1e-12 && (near(9.0) - 0.7).abs() < 1e-12);
+    assert!(
+        (speed_near(0.0, 0.1) - 0.1).abs() < 1e-12,
+        "never faster than the top speed"
+    );
+}
+
+#[test]
 fn a_line_is_followed_to_its_end_within_the_limits() {
     let line = [
         Point2::new(0.0, 0.0),

@@ -407,6 +407,28 @@ fn the_social_robot_keeps_out_of_the_space_of_one_who_stands() {
 }
 
 #[test]
+fn the_social_robot_goes_slower_near_who_stands() {
+    let fastest = |social: bool| {
+        let mut hall = Hall::new();
+        hall.people.push(person(4.0, 4.2, -FRAC_PI_2));
+        hall.social = social;
+        let task = point(7.0, 3.0);
+        let mut fastest: f64 = 0.0;
+        for _ in 0..400 {
+            let output = hall.step(Some(&task));
+            if output.status == Status::Arrived {
+                break;
+            }
+            if (3.5..4.5).contains(&hall.robot.position.x) {
+                fastest = fastest.max(output.command.linear);
+            }
+        }
+        fastest
+    };
+    assert!(fastest(true) < 0.9 * fastest(false));
+}
+
+#[test]
 fn equal_inputs_give_equal_commands_to_the_bit() {
     let commands = || {
         let mut hall = Hall::new();
