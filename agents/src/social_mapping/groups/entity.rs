@@ -18,6 +18,8 @@ pub struct GroupEntity {
     /// From the centre to the farthest member ahead, to the left, behind and to the right, metres.
     /// A quarter without a member has 0.
     pub extent: FourSided,
+    /// How far the members reach along the four directions, whichever quarter they are in, metres.
+    reach: FourSided,
 }
 
 impl GroupEntity {
@@ -44,12 +46,8 @@ impl GroupEntity {
             Vector2::x()
         };
         let world_from_group = Isometry2::new(centre, heading.y.atan2(heading.x));
-        let mut extent = FourSided {
-            front: 0.0,
-            left: 0.0,
-            rear: 0.0,
-            right: 0.0,
-        };
+        let mut extent = FourSided::from_sides([0.0; 4]);
+        let mut reach = [0.0f64; 4];
         for member in members {
             let place =
                 world_from_group.inverse_transform_point(&Point2::from(member.translation.vector));
@@ -64,23 +62,26 @@ impl GroupEntity {
                 &mut extent.right
             };
             *side = side.max(place.coords.norm());
+            for (most, along) in reach.iter_mut().zip([place.x, place.y, -place.x, -place.y]) {
+                *most = most.max(along);
+            }
         }
         Some(Self {
             world_from_group,
             extent,
+            reach: FourSided::from_sides(reach),
         })
     }
 
-    /// The widths of the group's own Gaussian: to each side the extent and a person's width beyond it,
-    /// so that the group's zones reach as far past its outermost members as theirs would. TG says that
-    /// the shape follows the four points and prints no law; this one is ours.
+    /// The widths of the group's own Gaussian: to each side a person's width beyond the extent, or beyond whoever of
+    /// another quarter reaches further that way. So no side is without width where nobody stands, and who stands
+    /// between two sides is not left outside. TG says that the shape follows the four points and prints no law; this
+    /// one is ours.
     pub fn widths(&self, person: &FourSided) -> FourSided {
-        FourSided {
-            front: self.extent.front + person.front,
-            left: self.extent.left + person.left,
-            rear: self.extent.rear + person.rear,
-            right: self.extent.right + person.right,
-        }
+        let (extent, reach, person) = (self.extent.sides(), self.reach.sides(), person.sides());
+        FourSided::from_sides(std::array::from_fn(|side| {
+            extent[side].max(reach[side]) + person[side]
+        }))
     }
 }
 
@@ -116,6 +117,25 @@ mod tests {
         assert!(front.abs() < 1e-12 && rear.abs() < 1e-12);
         let widths = group.widths(&FourSided::HALL);
         assert!((widths.left - 1.55).abs() < 1e-12 && (widths.rear - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_side_without_anybody_has_a_persons_width_and_nobody_is_outside_of_the_groups_space() {
+        // Two who look the same way, one ahead to the left of the other: just inside the quarter to the left.
+        let people = [at(0.0, 0.0, 0.0), at(2.0, 2.1, 0.0)];
+        let group = GroupEntity::new(&people).unwrap();
+        assert_eq!(
+            group.extent.sides().map(|side| side > 0.0),
+            [false, true, false, true]
+        );
+        let widths = group.widths(&FourSided::HALL);
+        for (side, least) in widths.sides().into_iter().zip(FourSided::HALL.sides()) {
+            assert!(side >= least);
+        }
+        for one in &people {
+            let place = Point2::from(one.translation.vector);
+            assert!(widths.density(&group.world_from_group, place) > 0.5);
+        }
     }
 
     #[test]
