@@ -238,6 +238,22 @@ pub enum Problem {
         /// Why.
         reason: String,
     },
+    /// A cost or duration of what the schema says to be no number.
+    #[error("a cost or duration is a number, and `{path}` is a {kind} by the schema")]
+    NoNumber {
+        /// The attribute, as it is written.
+        path: String,
+        /// Its kind.
+        kind: String,
+    },
+    /// An attribute is assigned to a link that the rule neither needs nor makes.
+    #[error(
+        "nothing in this rule says that there is a link `{link}`: where there is none, nothing is assigned"
+    )]
+    MaybeNoLink {
+        /// The link, as in a graph.
+        link: String,
+    },
     /// A combo of which the steps are a rule only without optional ones.
     #[error("this combo is never applied with all its steps: {reason}")]
     NeverWhole {
@@ -309,6 +325,7 @@ impl Problem {
             | Self::UndeclaredParent { .. }
             | Self::NotUnfolded { .. }
             | Self::NeverWhole { .. }
+            | Self::MaybeNoLink { .. }
             | Self::NeverMatches { .. }
             | Self::UnusedVariable { .. }
             | Self::BeyondManifest { .. }

@@ -99,7 +99,9 @@ pub use grammar::{
     Combo, ComboStep, ComboVariable, Constant, Goal, Grammar, Include, Property, TypeDeclaration,
     Types,
 };
-pub use load::{Defects, Loader, SHOWN_LIMIT, has_errors, load_grammar, parse_goal, parse_grammar};
+pub use load::{
+    Defects, Loader, SHOWN_LIMIT, format_goal, has_errors, load_grammar, parse_goal, parse_grammar,
+};
 pub use matching::{
     CHOICE_LIMIT, End, MatchDelta, MatchError, Matcher, Matches, Obstacle, RuleMatch, SEARCH_LIMIT,
     SearchPlan, SearchStep, SharedSteps, ValueError, WHOLE_LIMIT, Watch,

@@ -106,6 +106,17 @@ pub fn parse_goal(text: &str, file_name: &str, types: &Types) -> Result<Goal, De
     }
 }
 
+/// A goal's canonical text, its comments before it.
+///
+/// # Errors
+/// [`Defects`] with everything that is wrong with it.
+pub fn format_goal(text: &str, file_name: &str) -> Result<String, Defects> {
+    let goal = parse_goal(text, file_name, &Types::default())?;
+    let comments = crate::lexer::lex(text, 0).comments.into_iter();
+    let lines = comments.map(|(_, words)| format!("{}\n", format!("# {words}").trim_end()));
+    Ok(lines.chain([goal.to_string()]).collect())
+}
+
 /// Whether any of them is an error, so that the file must not be used.
 pub fn has_errors(diagnostics: &[Diagnostic]) -> bool {
     diagnostics

@@ -3,7 +3,7 @@
 //! Guarantee: whole numbers stay exact whatever their width, and nothing overflows: what has no
 //! result is `None`, and a comparison that makes no sense does not hold.
 
-use crate::{Arithmetic, Comparison};
+use crate::{Arithmetic, AttributePath, Comparison, Expression};
 use dsr::Value;
 use std::cmp::Ordering;
 
@@ -73,6 +73,52 @@ impl Arithmetic {
                 (Self::Multiply, a, b) => Some(Real(a.real() * b.real())),
                 (Self::Divide, a, b) => (b.real() != 0.0).then(|| Real(a.real() / b.real())),
             })
+    }
+}
+
+impl Expression {
+    /// The value of what names no attribute, if it has one.
+    pub(crate) fn constant(&self) -> Option<Value> {
+        match self {
+            Self::Literal(literal) => Some(literal.value()),
+            Self::Attribute(_) => None,
+            Self::Arithmetic { operator, operands } => {
+                let numbers = operands.iter().map(|one| Number::of(&one.constant()?));
+                let numbers: Vec<Number> = numbers.collect::<Option<_>>()?;
+                operator.compute(&numbers).and_then(Number::into_value)
+            }
+        }
+    }
+
+    /// The attributes that it reads.
+    pub(crate) fn paths(&self) -> Vec<&AttributePath> {
+        match self {
+            Self::Literal(_) => Vec::new(),
+            Self::Attribute(path) => vec![path],
+            Self::Arithmetic { operands, .. } => operands.iter().flat_map(Self::paths).collect(),
+        }
+    }
+
+    /// Whether it has a value in no graph: a constant that is no number is reckoned with, or 0 divides.
+    pub(crate) fn is_undefined(&self) -> bool {
+        let Self::Arithmetic { operator, operands } = self else {
+            return false;
+        };
+        let numbers: Vec<Option<Value>> = operands.iter().map(Self::constant).collect();
+        let is_text =
+            |value: &Option<Value>| value.as_ref().is_some_and(|v| Number::of(v).is_none());
+        let is_zero = |value: &Option<Value>| value.as_ref().and_then(Value::as_f64) == Some(0.0);
+        let by_zero = *operator == Arithmetic::Divide && numbers.iter().skip(1).any(is_zero);
+        by_zero
+            || numbers.iter().any(is_text)
+            || operands.iter().any(Self::is_undefined)
+            || numbers.iter().all(Option::is_some) && self.constant().is_none()
+    }
+
+    /// Whether it is no cost or duration in any graph: undefined, a constant below 0, or one that is no number.
+    pub(crate) fn is_no_amount(&self) -> bool {
+        let is_amount = |value: &Value| Number::of(value).is_some_and(|n| n.real() >= 0.0);
+        self.is_undefined() || self.constant().is_some_and(|value| !is_amount(&value))
     }
 }
 

@@ -108,6 +108,22 @@ fn conflicts_of_many_rules_have_a_limit_that_is_told() {
 }
 
 #[test]
+fn a_goal_is_printed_again_with_its_comments() {
+    let goal =
+        "# where to\n{ p:person  \"hall\":room p->\"hall\"(in) }\nprecondition { (> p.age 5) }";
+    let folder = folder(&[("goal.aggt", goal), ("bad.aggt", "{ p:person p->q(in) }")]);
+    let (code, out, _) = cortex(&folder, &["rules", "fmt", "goal.aggt"]);
+    let expected = "# where to\n{\n\tp:person\n\t\"hall\":room\n\tp->\"hall\"(in)\n}\n\
+                    precondition\n{\n\t(> p.age 5)\n}\n";
+    assert_eq!((code, &*out), (0, expected));
+    fs::write(folder.path().join("goal.aggt"), &out).unwrap();
+    let (_, again, _) = cortex(&folder, &["rules", "fmt", "goal.aggt"]);
+    assert_eq!(again, out);
+    let (code, out, told) = cortex(&folder, &["rules", "fmt", "bad.aggt"]);
+    assert_eq!((code, &*out), (2, ""), "{told}");
+}
+
+#[test]
 fn matches_without_end_are_listed_and_counted_in_part() {
     let node =
         |id: usize| json!({"id": id, "type": "box", "name": format!("b{id}"), "attributes": {}});

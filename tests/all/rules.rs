@@ -243,6 +243,11 @@ fn rules_beside_a_broken_one_are_used_and_the_broken_one_is_told() {
             "{err}"
         );
     }
+    let (_, out, _) = rules(&folder, "list", "a.aggl", &[]);
+    assert!(
+        out.contains("\nrule big") && out.contains("\nbroken rule bad"),
+        "{out}"
+    );
     let (code, _, err) = rules(&folder, "match", "a.aggl", &["--world", "--rule", "bad"]);
     assert_eq!(code, 2);
     assert!(err.contains("robto"), "{err}");
@@ -475,11 +480,12 @@ fn explain_shows_which_rules_share_steps_when_they_are_watched() {
     let folder = Folder::new(&[("rules.aggl", text)]);
     let (code, out, _) = rules(&folder, "explain", "rules.aggl", &["--rule", "meet"]);
     assert_eq!(code, 0);
-    let expected = "watched with go, once where `in` changes: given r a, b from door of a";
+    let expected = "watched with go, once where `in` changes (in the names of go): given r a, b from door of a";
     assert!(out.contains(expected), "{out}");
     let (_, out, _) = rules(&folder, "explain", "rules.aggl", &["--json"]);
     let plans: Value = serde_json::from_str(&out).unwrap();
-    let set = json!({"label": "in", "with": ["meet"], "steps": ["given r a", "b from door of a"]});
+    let set = json!({"label": "in", "with": ["meet"], "names_of": "go",
+        "steps": ["given r a", "b from door of a"]});
     let shared = plans[0]["shared"].as_array().unwrap();
     assert!(shared.contains(&set), "{shared:?}");
 }

@@ -3,13 +3,10 @@
 //! Guarantee: a contradiction is only given where no graph and no binding meets the conditions; where there
 //! are too many cases to look at, none is given.
 
-use super::facts::{Compared, Facts, constant};
-use super::order::Side;
+use super::facts::{Compared, Facts};
+use super::side::{key, side};
 use crate::matching::conjuncts;
-use crate::{
-    Arithmetic, AttributePath, Condition, Expression, Grammar, Name, Number, PatternEdge,
-    PatternNode, Rule, Types,
-};
+use crate::{Condition, Grammar, Name, PatternEdge, PatternNode, Rule, Types};
 use dsr::Schema;
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -22,7 +19,7 @@ const NODES: usize = 8;
 /// A node that a variable stands for: those of the match come first.
 pub(super) type Node = usize;
 
-type Scope = Rc<BTreeMap<Name, Node>>;
+pub(super) type Scope = Rc<BTreeMap<Name, Node>>;
 
 /// A formula that comes out one way or the other, and what its variables stand for.
 #[derive(Clone)]
@@ -428,72 +425,4 @@ fn same_as<'r>(name: &Name, body: &'r Condition) -> Option<&'r Name> {
         Condition::Same(a, b) if b == name && a != name => Some(a),
         _ => None,
     })
-}
-
-/// What tells expressions apart: the same for the same attribute of the same node.
-fn key(expression: &Expression, scope: &Scope) -> Option<String> {
-    Some(match expression {
-        Expression::Literal(_) => expression.to_string(),
-        Expression::Attribute(AttributePath::Node {
-            variable,
-            attribute,
-        }) => format!("{}.{attribute}", scope.get(variable)?),
-        Expression::Attribute(AttributePath::Edge {
-            from,
-            label,
-            to,
-            attribute,
-        }) => {
-            let (from, to) = (scope.get(from)?, scope.get(to)?);
-            format!("e({from},{label},{to}).{attribute}")
-        }
-        Expression::Arithmetic { operator, operands } => {
-            let operands = operands.iter().map(|operand| key(operand, scope));
-            let operands: Vec<String> = operands.collect::<Option<_>>()?;
-            format!("({} {})", operator.symbol(), operands.join(" "))
-        }
-    })
-}
-
-/// What an expression adds to what.
-fn side(expression: &Expression, scope: &Scope) -> Side {
-    if let Some(constant) = constant(expression) {
-        return Side::Constant(constant);
-    }
-    let sum = match expression {
-        Expression::Literal(_) => None,
-        Expression::Attribute(_) => key(expression, scope).map(|base| Side::Sum {
-            base,
-            added: Vec::new(),
-        }),
-        Expression::Arithmetic { operator, operands } => sum(*operator, operands, scope),
-    };
-    sum.unwrap_or(Side::Other)
-}
-
-/// The same for arithmetic, if it is a sum of one attribute and constants.
-fn sum(operator: Arithmetic, operands: &[Expression], scope: &Scope) -> Option<Side> {
-    let number = |value: &Expression| constant(value).as_ref().and_then(Number::of);
-    let place = operands.iter().position(|one| constant(one).is_none())?;
-    let Side::Sum { base, mut added } = side(&operands[place], scope) else {
-        return None;
-    };
-    match operator {
-        Arithmetic::Add => {
-            if place > 0 {
-                let first: Option<Vec<Number>> = operands[..place].iter().map(number).collect();
-                added.push(operator.compute(&first?)?);
-            }
-            for one in &operands[place + 1..] {
-                added.push(number(one)?);
-            }
-        }
-        Arithmetic::Subtract if place == 0 && operands.len() > 1 => {
-            for one in &operands[1..] {
-                added.push(Arithmetic::Subtract.compute(&[number(one)?])?);
-            }
-        }
-        _ => return None,
-    }
-    Some(Side::Sum { base, added })
 }

@@ -4,7 +4,7 @@
 
 use super::contradiction::Node;
 use super::order::{Asked, Order, Side};
-use crate::{Arithmetic, AttributePath, Comparison, Expression, Name, Number};
+use crate::{AttributePath, Comparison, Expression, Name};
 use dsr::{Schema, Value, ValueKind};
 use std::collections::BTreeMap;
 
@@ -85,43 +85,6 @@ pub(super) struct Facts<'r> {
     clash: Option<String>,
 }
 
-/// The value of what names no attribute, if it has one.
-pub(super) fn constant(expression: &Expression) -> Option<Value> {
-    match expression {
-        Expression::Literal(literal) => Some(literal.value()),
-        Expression::Attribute(_) => None,
-        Expression::Arithmetic { operator, operands } => {
-            let numbers = operands.iter().map(|one| Number::of(&constant(one)?));
-            let numbers: Vec<Number> = numbers.collect::<Option<_>>()?;
-            operator.compute(&numbers).and_then(Number::into_value)
-        }
-    }
-}
-
-/// An attribute that an expression reads.
-fn path_in(expression: &Expression) -> Option<&AttributePath> {
-    match expression {
-        Expression::Literal(_) => None,
-        Expression::Attribute(path) => Some(path),
-        Expression::Arithmetic { operands, .. } => operands.iter().find_map(path_in),
-    }
-}
-
-/// Whether an expression has a value in no graph: a constant that is no number is reckoned with, or 0 divides.
-fn is_undefined(expression: &Expression) -> bool {
-    let Expression::Arithmetic { operator, operands } = expression else {
-        return false;
-    };
-    let numbers: Vec<Option<Value>> = operands.iter().map(constant).collect();
-    let is_text = |value: &Option<Value>| value.as_ref().is_some_and(|v| Number::of(v).is_none());
-    let is_zero = |value: &Option<Value>| value.as_ref().and_then(Value::as_f64) == Some(0.0);
-    let by_zero = *operator == Arithmetic::Divide && numbers.iter().skip(1).any(is_zero);
-    by_zero
-        || numbers.iter().any(is_text)
-        || operands.iter().any(is_undefined)
-        || numbers.iter().all(Option::is_some) && constant(expression).is_none()
-}
-
 fn mirrored(operator: Comparison) -> Comparison {
     match operator {
         Comparison::Less => Comparison::Greater,
@@ -189,19 +152,20 @@ impl<'r> Facts<'r> {
         words: impl Fn() -> String,
     ) -> Option<String> {
         let (left, right) = (one.expression, other.expression);
-        if is_undefined(left) || is_undefined(right) {
+        if left.is_undefined() || right.is_undefined() {
             return holds.then(|| format!("{} never holds: what it reckons has no value", words()));
         }
-        if let (Some(a), Some(b)) = (constant(left), constant(right)) {
+        if let (Some(a), Some(b)) = (left.constant(), right.constant()) {
             let never = operator.holds(&a, &b) != holds;
             return never.then(|| format!("{} never holds", words()));
         }
         for (compared, with, operator) in
             [(&one, right, operator), (&other, left, mirrored(operator))]
         {
-            if let (Side::Sum { base, .. }, Some(path)) =
-                (&compared.side, path_in(compared.expression))
-            {
+            if let (Side::Sum { base, .. }, Some(path)) = (
+                &compared.side,
+                compared.expression.paths().into_iter().next(),
+            ) {
                 self.bases.insert(base.clone(), path);
             }
             if let Expression::Attribute(path) = compared.expression {
@@ -212,7 +176,7 @@ impl<'r> Facts<'r> {
                     is_there: false,
                 });
                 attribute.is_there |= holds;
-                if let Some(constant) = constant(with) {
+                if let Some(constant) = with.constant() {
                     let not = if holds { "" } else { "not " };
                     let symbol = operator.symbol();
                     attribute.bounds.push(Bound {

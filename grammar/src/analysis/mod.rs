@@ -4,6 +4,7 @@
 //! Guarantee: a rule that is said never to match does not; a conflict that is shown happens in the
 //! graph that it is shown with.
 
+mod adrift;
 mod complete;
 mod conflict;
 mod contradiction;
@@ -14,6 +15,7 @@ mod manifest;
 mod never;
 mod order;
 mod reach;
+mod side;
 mod unused;
 mod values;
 
@@ -52,6 +54,7 @@ impl Grammar {
                 findings.push(at(&rule.name, Problem::NeverMatches { reason }));
             }
             unused::variables(rule, &mut findings);
+            adrift::links(rule, &mut findings);
             let wakes = |other: &crate::Rule| other.activates.contains(&rule.name);
             if rule.dormant && !self.rules.iter().any(wakes) {
                 let reason = "it is dormant, and no rule activates it".to_owned();

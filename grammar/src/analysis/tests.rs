@@ -52,6 +52,42 @@ fn said(precondition: &str, schema: Option<&Schema>) -> Vec<String> {
 }
 
 #[test]
+fn what_is_assigned_to_links_that_need_not_be_there_is_told() {
+    let text = "name=x
+===
+a : active(1) { { a:t b:t a->b(l) } => { a:t b:t a->b(l) }
+ effect { (assign e(a, l, b).d 1) (assign e(b, l, a).d 1) } }
+b : active(1) { { a:t b:t a->b(l) } => { a:t b:t } effect { (assign e(a, l, b).d 1) } }
+c : active(1) { { a:t b:t } => { a:t b:t } precondition { (> e(a, l, b).d 2) }
+ effect { (assign e(a, l, b).d 1) (l b a) (assign e(b, l, a).d 1) } }
+d : active(1) { { a:t } => { a:t } effect { (forall q:t (when (l a q) (assign e(a, l, q).d 1))) } }
+e : active(1) { { a:t } => { a:t } effect { (forall q:t (assign e(a, l, q).d (+ e(a, l, q).d 1))) } }
+f : active(1) { { a:t } => { a:t } effect { (forall q:t (assign e(a, l, q).d 1)) } }
+";
+    check(
+        read(text).analyse(None),
+        &expect![[r#"
+        test.aggl:4:48: warning: nothing in this rule says that there is a link `b->a(l)`: where there is none, nothing is assigned
+        test.aggl:5:74: warning: nothing in this rule says that there is a link `a->b(l)`: where there is none, nothing is assigned
+        test.aggl:10:70: warning: nothing in this rule says that there is a link `a->q(l)`: where there is none, nothing is assigned"#]],
+    );
+}
+
+#[test]
+fn conflicts_are_told_in_the_names_of_their_graph() {
+    let text = "name=x
+===
+go : active(1) { { r:robot a:room b:room r->a(in) a->b(door) } => { r:robot a:room b:room r->b(in) a->b(door) } }
+stay : active(1) { { b:robot a:room b->a(in) } => { b:robot a:room b->a(in) } }
+";
+    let found = read(text).conflicts(None, crate::EFFORT_LIMIT).found;
+    let told: Vec<String> = found.iter().map(|c| c.diagnostic.to_string()).collect();
+    expect![[r#"
+        `go` can disable `go` (r has no link `in` to a) where there are r:robot a:room b:room b_2:room r->a(in) a->b(door) a->b_2(door)
+        `go` can disable `stay` (r has no link `in` to a) where there are r:robot a:room b:room r->a(in) a->b(door)"#]].assert_eq(&told.join("\n"));
+}
+
+#[test]
 fn contradictions_are_found_wherever_they_are() {
     let never = [
         "(not (= 1 1))",
@@ -78,6 +114,9 @@ fn contradictions_are_found_wherever_they_are() {
         "(and (or (l b a) (= a.s 1)) (= a.s 2))",
         "(and (> a.n 2) (not (>= a.n 2)))",
         "(and (when (l a b) (= a.s 1)) (= a.s 2))",
+        "(and (> (* a.n b.n) 5) (< (* a.n b.n) 5))",
+        "(and (> (* a.n b.n) b.m) (> b.m a.m) (> a.m (* a.n b.n)))",
+        "(and (> (+ a.n b.n) 5) (= a.m (+ a.n b.n)) (< a.m 4))",
     ];
     for condition in never {
         let said = said(condition, None);

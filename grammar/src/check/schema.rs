@@ -115,7 +115,8 @@ impl SchemaCheck<'_> {
             .into_iter()
             .flatten()
         {
-            self.expression(expression);
+            self.expression(expression, &bound);
+            self.amount(expression);
         }
         if let Some(condition) = &rule.precondition {
             self.condition(condition, &mut bound.clone());
@@ -210,29 +211,46 @@ impl SchemaCheck<'_> {
         }
     }
 
-    fn path(&mut self, path: &AttributePath) {
+    /// A cost or duration reckons with numbers only.
+    fn amount(&mut self, expression: &Expression) {
+        let path = match expression {
+            Expression::Literal(_) => return,
+            Expression::Attribute(path) => path,
+            Expression::Arithmetic { operands, .. } => {
+                return operands.iter().for_each(|operand| self.amount(operand));
+            }
+        };
+        let (AttributePath::Node { attribute, .. } | AttributePath::Edge { attribute, .. }) = path;
+        let found = self.schema.find_attribute(attribute);
+        let kind = found.and_then(|id| self.schema.attributes()[usize::from(id.0)].kind);
+        if let Some(kind) = kind.filter(|kind| convert(&Value::I64(0), *kind).is_none()) {
+            let (path, kind) = (path.to_string(), kind.to_string());
+            self.report(attribute, Problem::NoNumber { path, kind });
+        }
+    }
+
+    fn path(&mut self, path: &AttributePath, scope: &[PatternNode]) {
         match path {
             AttributePath::Node { attribute, .. } => self.attribute(attribute),
             AttributePath::Edge {
-                label, attribute, ..
+                from,
+                label,
+                to,
+                attribute,
             } => {
                 self.attribute(attribute);
-                if self.schema.find_label(label).is_none() {
-                    let schema = self.schema;
-                    let known = schema.labels().iter().map(|known| known.name.as_str());
-                    self.unknown("label", label, known);
-                }
+                self.link(label, from, to, scope);
             }
         }
     }
 
-    fn expression(&mut self, expression: &Expression) {
+    fn expression(&mut self, expression: &Expression, scope: &[PatternNode]) {
         match expression {
             Expression::Literal(_) => {}
-            Expression::Attribute(path) => self.path(path),
+            Expression::Attribute(path) => self.path(path, scope),
             Expression::Arithmetic { operands, .. } => {
                 for operand in operands {
-                    self.expression(operand);
+                    self.expression(operand, scope);
                 }
             }
         }
@@ -272,8 +290,8 @@ impl SchemaCheck<'_> {
             Condition::Edge { label, from, to } => self.link(label, from, to, scope),
             Condition::Same(..) => {}
             Condition::Compare { left, right, .. } => {
-                self.expression(left);
-                self.expression(right);
+                self.expression(left, scope);
+                self.expression(right, scope);
             }
             Condition::Not(inner) => self.condition(inner, scope),
             Condition::And(all) | Condition::Or(all) => {
@@ -318,8 +336,8 @@ impl SchemaCheck<'_> {
                     self.link(label, from, to, after);
                 }
                 Effect::Assign { target, value } => {
-                    self.path(target);
-                    self.expression(value);
+                    self.path(target, after);
+                    self.expression(value, before);
                     self.assigned(target, value);
                 }
                 Effect::Create {
@@ -421,6 +439,19 @@ r : active(1)
             test.aggl:13:13: error: this can never be assigned: `level` is a u32, not a string
             test.aggl:14:13: error: this can never be assigned: `name` is a string, not a i64
             test.aggl:15:30: error: this can never be assigned: `name` is a string, not a i64"#]].assert_eq(&Defects { diagnostics }.to_string());
+    }
+
+    #[test]
+    fn costs_that_are_no_numbers_are_told() {
+        let text = "name=x\n===\n\
+                    r : active(1) cost (a.name) duration (* 2 a.name) { { a:room } => { a:room } }\n\
+                    s : active(1) cost (e(a, at, b).distance) { { a:room b:room } => { a:room } }\n\
+                    t : active(1) cost (a.level) duration (e(a, connected, b).distance) { { a:room b:room } => { a:room } }\n";
+        let diagnostics = read(text).check_schema(&schema());
+        expect![[r#"
+            test.aggl:3:23: error: a cost or duration is a number, and `a.name` is a string by the schema
+            test.aggl:3:45: error: a cost or duration is a number, and `a.name` is a string by the schema
+            test.aggl:4:26: error: `at` never joins a `room` to a `room` by the schema"#]].assert_eq(&Defects { diagnostics }.to_string());
     }
 
     #[test]

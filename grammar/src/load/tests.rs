@@ -297,25 +297,6 @@ fn a_misspelt_keyword_or_an_open_rule_hides_no_include() {
 }
 
 #[test]
-fn a_combo_that_is_never_whole_is_told_where_it_breaks() {
-    let rules = "name=x\n===\ndrop : active(1) { { c:cup } => { } }\n\
-                 wash : active(1) { { c:cup } => { c:cup } effect { (assign c.clean true) } }\n";
-    check(
-        &format!(
-            "{rules}both : active(1) {{\ndrop as d optional\nwash as w\nwhere:\nd.c = w.c\n}}\n"
-        ),
-        &expect![
-            "f.aggl:7:9: warning: this combo is never applied with all its steps: step `w` uses `c`, which an earlier step deletes"
-        ],
-    );
-    // Without the optional step's node being the same, nothing is wrong.
-    check(
-        &format!("{rules}both : active(1) {{\ndrop as d optional\nwash as w\n}}\n"),
-        &expect![[""]],
-    );
-}
-
-#[test]
 fn included_files_are_read_once_and_missing_ones_are_told() {
     let mut asked = Vec::new();
     let (grammar, diagnostics) = load_grammar(

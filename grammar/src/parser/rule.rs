@@ -192,13 +192,10 @@ impl Parser<'_> {
         }
         let range = self.bump();
         let repeated = match word {
-            "cost" => header
-                .cost
-                .replace(self.bracketed_expression("the cost")?)
-                .is_some(),
+            "cost" => header.cost.replace(self.amount("the cost")?).is_some(),
             "duration" => header
                 .duration
-                .replace(self.bracketed_expression("seconds")?)
+                .replace(self.amount("the duration in seconds")?)
                 .is_some(),
             "agent" => {
                 self.expect("(", "`(` and an agent's name")?;
@@ -237,6 +234,18 @@ impl Parser<'_> {
             self.out_of_range(range.clone(), what, "0 or more");
         }
         self.number_literal(range)
+    }
+
+    /// An expression in brackets that can be a number of 0 or more.
+    fn amount(&mut self, what: &'static str) -> Option<Expression> {
+        let (first, told) = (self.at, self.findings.len());
+        let expression = self.bracketed_expression(what)?;
+        if expression.is_no_amount() && self.findings.len() == told {
+            let last = &self.tokens[self.at - 1];
+            let (start, end) = (self.tokens[first].range.start, last.range.end);
+            self.out_of_range(start..end, what, "a number of 0 or more");
+        }
+        Some(expression)
     }
 
     /// The number that is written there.

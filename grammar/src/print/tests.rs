@@ -9,6 +9,19 @@ use expect_test::expect;
 use proptest::prelude::*;
 
 #[test]
+fn costs_and_durations_that_are_no_amounts_are_told() {
+    let text = "name=x\n===\na : active(1) cost (- 1 5) { { a:t } => { } }\n\
+         b : active(1) duration (/ 1 0) { { a:t } => { } }\nc : active(1) cost (\"x\") { { a:t } => { } }\n\
+         d : active(1) cost (- a.n 5) duration (* 2 3) { { a:t } => { } }\n";
+    let (_, diagnostics) = parse_grammar(text, "f.aggl");
+    expect![[r#"
+            f.aggl:3:20: error: the cost must be a number of 0 or more, not (- 1 5)
+            f.aggl:4:24: error: the duration in seconds must be a number of 0 or more, not (/ 1 0)
+            f.aggl:5:21: error: this takes numbers, not text"#]]
+    .assert_eq(&Defects { diagnostics }.to_string());
+}
+
+#[test]
 fn whole_numbers_are_exact_from_the_least_to_the_largest() {
     let schema = "open = true\n[attributes]\nn = { kind = \"u64\", index = true }\n";
     let schema = Schema::from_toml("schema", schema).unwrap();

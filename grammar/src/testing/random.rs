@@ -161,6 +161,12 @@ impl Words {
         })
     }
 
+    /// An expression that can be a cost.
+    fn amount(self) -> impl Strategy<Value = Expression> {
+        self.expression()
+            .prop_filter("of 0 or more", |expression| !expression.is_no_amount())
+    }
+
     pub(crate) fn condition(self) -> impl Strategy<Value = Condition> {
         let comparison = select(&[
             Comparison::Equal,
@@ -255,9 +261,9 @@ impl Words {
                 (0..9_i64)
                     .prop_map(Literal::Integer)
                     .prop_map(Expression::Literal),
-                self.expression()
+                self.amount()
             ],
-            option::of(self.expression()),
+            option::of(self.amount()),
             option::of(name(self.variables)),
             prop_oneof![Just(1.0), 0.0..1.0],
             [prop::bool::ANY, prop::bool::ANY, prop::bool::ANY],

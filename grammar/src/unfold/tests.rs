@@ -8,6 +8,7 @@ use crate::{
     Binding, Combo, ComboStep, ComboVariable, Grammar, Kind, Name, PatternEdge, Rule, Unfolded,
     parse_grammar,
 };
+use expect_test::expect;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 
@@ -285,4 +286,29 @@ proptest! {
             }
         }
     }
+}
+
+/// What is reported about a grammar.
+fn told(text: &str, expected: &expect_test::Expect) {
+    let (_, diagnostics) = crate::parse_grammar(text, "f.aggl");
+    expected.assert_eq(&crate::Defects { diagnostics }.to_string());
+}
+
+#[test]
+fn a_combo_that_is_never_whole_is_told_where_it_breaks() {
+    let rules = "name=x\n===\ndrop : active(1) { { c:cup } => { } }\n\
+                 wash : active(1) { { c:cup } => { c:cup } effect { (assign c.clean true) } }\n";
+    told(
+        &format!(
+            "{rules}both : active(1) {{\ndrop as d optional\nwash as w\nwhere:\nd.c = w.c\n}}\n"
+        ),
+        &expect![
+            "f.aggl:7:9: warning: this combo is never applied with all its steps: step `w` uses `c`, which an earlier step deletes"
+        ],
+    );
+    // Without the optional step's node being the same, nothing is wrong.
+    told(
+        &format!("{rules}both : active(1) {{\ndrop as d optional\nwash as w\n}}\n"),
+        &expect![[""]],
+    );
 }

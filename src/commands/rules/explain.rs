@@ -65,10 +65,16 @@ fn sharing(plan: &SearchPlan, shared: &[&SharedSteps]) -> String {
     for set in shared.iter().take(SHOWN) {
         let (label, steps) = (&set.label, set.steps.join(", "));
         let others = others(plan, set).join(" ");
+        let first = &set.rules[0];
+        let named = if *first == plan.rule {
+            String::new()
+        } else {
+            format!(" (in the names of {first})")
+        };
         // Writing to a string does not fail.
         let _ = writeln!(
             text,
-            "    watched with {others}, once where `{label}` changes: {steps}"
+            "    watched with {others}, once where `{label}` changes{named}: {steps}"
         );
     }
     if shared.len() > SHOWN {
@@ -78,7 +84,11 @@ fn sharing(plan: &SearchPlan, shared: &[&SharedSteps]) -> String {
 }
 
 fn plan_json(plan: &SearchPlan, shared: &[&SharedSteps]) -> Json {
-    let set = |set: &&SharedSteps| json!({"label": set.label, "with": others(plan, set), "steps": set.steps});
+    let set = |set: &&SharedSteps| {
+        json!({
+            "label": set.label, "with": others(plan, set), "names_of": set.rules[0], "steps": set.steps,
+        })
+    };
     let step = |step: &SearchStep| {
         json!({
             "binds": step.binds,

@@ -251,10 +251,26 @@ fn words_of_nodes(rule: &Rule) -> String {
 
 fn list(file: &Path, as_json: bool) -> Result<Answer, Failure> {
     let (grammar, diagnostics) = read(file)?;
+    let sound = grammar.sound(&diagnostics).ok();
+    let broken = |name: &Name| {
+        let is_there = |sound: &Sound| {
+            sound.grammar.rules.iter().any(|rule| rule.name == *name)
+                || sound.grammar.combos.iter().any(|combo| combo.name == *name)
+        };
+        grammar::has_errors(&diagnostics) && !sound.as_ref().is_some_and(is_there)
+    };
     if as_json {
-        let rules = grammar.rules.iter().map(rule_json);
+        let rules = grammar.rules.iter().map(|rule| {
+            let mut row = rule_json(rule);
+            row["broken"] = json!(broken(&rule.name));
+            row
+        });
         let combos = grammar.combos.iter();
-        let combos = combos.map(|combo| combo_json(&grammar, combo));
+        let combos = combos.map(|combo| {
+            let mut row = combo_json(&grammar, combo);
+            row["broken"] = json!(broken(&combo.name));
+            row
+        });
         let types = grammar.types.names().chain(grammar.types.undeclared());
         let mut types: Vec<&str> = types.map(|name| &**name).collect();
         let mut seen = BTreeSet::new();
@@ -265,6 +281,7 @@ fn list(file: &Path, as_json: bool) -> Result<Answer, Failure> {
         print_json(&object)?;
         return Ok(Answer::Yes);
     }
+    let mark = |name: &Name| if broken(name) { "broken " } else { "" };
     let mut text = String::new();
     for declaration in &grammar.types.declarations {
         let names = |names: &[grammar::Name]| {
@@ -288,7 +305,8 @@ fn list(file: &Path, as_json: bool) -> Result<Answer, Failure> {
             .map_or_else(String::new, |agent| format!(", by {agent}"));
         let _ = writeln!(
             text,
-            "rule {} : {}, cost {}{agent}  ({})",
+            "{}rule {} : {}, cost {}{agent}  ({})",
+            mark(&rule.name),
             rule.name,
             rule.kind,
             rule.cost,
@@ -304,7 +322,8 @@ fn list(file: &Path, as_json: bool) -> Result<Answer, Failure> {
         let (name, kind, cost) = (&combo.name, combo.kind, combo.cost);
         let _ = writeln!(
             text,
-            "combo {name} : {kind}, cost {cost}  ({})",
+            "{}combo {name} : {kind}, cost {cost}  ({})",
+            mark(name),
             steps.join(", ")
         );
         for variant in variants(&grammar, combo) {
@@ -318,6 +337,11 @@ fn list(file: &Path, as_json: bool) -> Result<Answer, Failure> {
 }
 
 fn format(file: &Path, as_json: bool) -> Result<Answer, Failure> {
+    if is_goal(file) {
+        let text = grammar::format_goal(&super::read_text(file)?, &file.display().to_string());
+        let text = text.map_err(|defects| Failure::Input(defects.into()))?;
+        return formatted(&text, as_json);
+    }
     let (grammar, diagnostics) = read(file)?;
     // What cannot be read would be lost. An included file is not printed: it may be missing.
     let main = grammar.files.first().map(grammar::SourceFile::name);
@@ -330,10 +354,14 @@ fn format(file: &Path, as_json: bool) -> Result<Answer, Failure> {
         return Err(Failure::Input(Defects { diagnostics: lost }.into()));
     }
     warn(rest);
+    formatted(&grammar.to_string(), as_json)
+}
+
+fn formatted(text: &str, as_json: bool) -> Result<Answer, Failure> {
     if as_json {
-        print_json(&json!({ "text": grammar.to_string() }))?;
+        print_json(&json!({ "text": text }))?;
     } else {
-        print(&grammar.to_string())?;
+        print(text)?;
     }
     Ok(Answer::Yes)
 }

@@ -79,6 +79,11 @@ impl<'a> Joint<'a> {
         }
     }
 
+    /// The second rule.
+    pub(super) fn second(&self) -> &Rule {
+        &self.rules[1]
+    }
+
     /// The first rule.
     pub(super) fn first(&self) -> &Rule {
         &self.rules[0]

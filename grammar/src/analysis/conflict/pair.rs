@@ -257,9 +257,13 @@ impl Pair<'_> {
             ..Transaction::new()
         };
         graph.commit(&change, "analysis", Time::default()).ok()?;
-        let obstacle = grammar
-            .obstacle(&graph.snapshot(), self.second, &two)
-            .ok()??;
+        let after = graph.snapshot();
+        grammar.obstacle(&after, self.second, &two).ok()??;
+        // In the names of the graph, where a variable of both rules could stand for two nodes.
+        let joint = Joint::new(&grammar.types, [self.first, self.second], laid);
+        let second = joint.second();
+        let named = bound(second, &joint.places)?;
+        let obstacle = grammar.obstacle(&after, second, &named).ok()??;
         Some(Trial {
             first: one,
             second: two,
