@@ -31,8 +31,16 @@ impl Hall {
         Ok(Self { instance })
     }
 
+    pub(super) fn name(&self) -> &str {
+        self.instance.name()
+    }
+
     pub(super) fn instance(&self) -> &Instance {
         &self.instance
+    }
+
+    pub(super) fn processes(&self) -> Result<Vec<u32>, Failure> {
+        self.instance.processes().map_err(Failure::internal)
     }
 
     pub(super) fn session(&self, agent: &str) -> Result<Session, Failure> {

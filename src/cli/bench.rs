@@ -45,7 +45,7 @@ pub(crate) enum BenchAction {
         tasks: Option<PathBuf>,
     },
     /// Path search and the elastic band
-    #[command(after_help = "Takes about ten seconds.\n\nExample:\n  cortex bench path")]
+    #[command(after_help = "Takes about half a minute.\n\nExample:\n  cortex bench path")]
     Path,
 }
 

@@ -3,6 +3,7 @@
 
 mod floor;
 mod peers;
+mod reaction;
 
 use super::chance::Chance;
 use super::figure::{Figure, median};
@@ -223,5 +224,6 @@ pub(crate) fn paths() -> Result<Vec<Figure>, Failure> {
     replanning(["replan_400", "replan_400_astar"], 400, &mut figures)?;
     replanning(["replan_2000", "replan_2000_astar"], 2000, &mut figures)?;
     band(&mut figures);
+    reaction::reaction(&mut figures)?;
     Ok(figures)
 }
