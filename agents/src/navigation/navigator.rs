@@ -12,10 +12,11 @@ mod drive;
 mod replan;
 
 use self::course::Course;
+use self::drive::calmed;
 use self::replan::person_of;
 use super::anticipation::Anticipation;
 use super::band::{Band, Gains};
-use super::control::{Guard, Limits, Motion, Unicycle, speed_near, turn_to, wrapped};
+use super::control::{Guard, Limits, Motion, Unicycle, turn_to, wrapped};
 use super::ground::Ground;
 use super::map_age::MapState;
 use super::obstacles::{Obstacles, Wall, world_hits};
@@ -478,24 +479,6 @@ impl Navigator {
         let heading = destination.heading.unwrap_or(view.robot.heading);
         let turn = turn_to(&view.robot, heading, self.config.heading_tolerance);
         Some((turn, Status::Waiting(Cause::People)))
-    }
-}
-
-/// The same motion, slower near those who stand: see [`speed_near`].
-fn calmed(wanted: Motion, view: &View) -> Motion {
-    let limits = &view.inputs.limits;
-    let standing = view.others.iter().filter(|person| !person.is_walking());
-    let gaps = standing.map(|person| {
-        distance(&person.position(), &view.robot.position) - person.radius - limits.radius
-    });
-    let nearest = gaps.fold(f64::INFINITY, f64::min);
-    if !view.inputs.social {
-        return wanted;
-    }
-    let most = speed_near(nearest, limits.max_speed);
-    Motion {
-        linear: wanted.linear.clamp(-most, most),
-        ..wanted
     }
 }
 

@@ -7,8 +7,9 @@ use super::{Cause, Decision, Failure, Navigator, STAND, Status, View};
 use crate::grid::CostGrid;
 use crate::navigation::anticipation::{Manoeuvre, Scene};
 use crate::navigation::band::{BandState, Surroundings};
-use crate::navigation::control::{Motion, follow, turn_to};
+use crate::navigation::control::{Motion, follow, speed_near, turn_to};
 use crate::navigation::people::Person;
+use nalgebra::distance;
 
 /// A companion that is farther away than this from where they should be is gone another way, metres.
 const CATCHING_UP: f64 = 2.0;
@@ -152,4 +153,22 @@ fn falls_back(course: &Course, view: &View) -> Option<Motion> {
     let near = way.norm() < CATCHING_UP;
     let walks = person_of(&course.task, view.inputs.people).is_some_and(Person::is_walking);
     (walks && near && ahead < 0.0).then(|| turn_to(&view.robot, heading, 0.1))
+}
+
+/// The same motion, slower near those who stand: see [`speed_near`].
+pub(super) fn calmed(wanted: Motion, view: &View) -> Motion {
+    let limits = &view.inputs.limits;
+    let standing = view.others.iter().filter(|person| !person.is_walking());
+    let gaps = standing.map(|person| {
+        distance(&person.position(), &view.robot.position) - person.radius - limits.radius
+    });
+    let nearest = gaps.fold(f64::INFINITY, f64::min);
+    if !view.inputs.social {
+        return wanted;
+    }
+    let most = speed_near(nearest, limits.max_speed);
+    Motion {
+        linear: wanted.linear.clamp(-most, most),
+        ..wanted
+    }
 }
