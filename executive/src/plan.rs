@@ -117,7 +117,7 @@ impl Outcome {
 /// Plans from what holds in `snapshot` to `goal`.
 ///
 /// Combos, `passive` and `hierarchical` rules are not planned with: they sum up other rules, or
-/// happen by themselves. A cost that reads an attribute which rules assign is the cost at first.
+/// happen by themselves.
 ///
 /// # Errors
 /// [`ReadError`] where the snapshot cannot be read any more; a goal that names what is not there is
@@ -249,19 +249,15 @@ fn solve(asked: Asked<'_>, limits: &mut Limits<'_>) -> Outcome {
         Effort::Optimal => usize::MAX,
         Effort::First | Effort::Anytime => asked.many,
     };
-    let stopped = |stop, limits: &Limits<'_>| {
-        let reason = format!("stopped while grounding: {stop}");
-        Outcome::without_plan(Status::Limit, reason, limits.expanded())
-    };
     match problem.reach(awake, Scope::All(most), limits) {
         Ok(reached) if !reached.overflow => return search_in(asked, &reached, limits),
         Ok(_) => {}
-        Err(stop) => return stopped(stop, limits),
+        Err(stop) => return stopped_while_grounding(stop, limits),
     }
     match narrow::plan(asked, limits) {
         Ok(Some(outcome)) => return outcome,
         Ok(None) => {}
-        Err(stop) => return stopped(stop, limits),
+        Err(stop) => return stopped_while_grounding(stop, limits),
     }
     limits.cap(LIFTED_FIRST);
     let outcome = lifted::plan(asked, limits);
@@ -274,8 +270,13 @@ fn solve(asked: Asked<'_>, limits: &mut Limits<'_>) -> Outcome {
         Ok(_) | Err(StopReason::Memory) => {
             lifted::plan(asked, limits).unwrap_or_else(|outcome| outcome)
         }
-        Err(stop) => stopped(stop, limits),
+        Err(stop) => stopped_while_grounding(stop, limits),
     }
+}
+
+fn stopped_while_grounding(stop: StopReason, limits: &Limits<'_>) -> Outcome {
+    let reason = format!("stopped while grounding: {stop}");
+    Outcome::without_plan(Status::Limit, reason, limits.expanded())
 }
 
 /// So many states are expanded without ground actions before all of these are made.
@@ -289,7 +290,10 @@ fn search_in(asked: Asked<'_>, reached: &Reached, limits: &mut Limits<'_>) -> Ou
     let Asked {
         problem, options, ..
     } = asked;
-    let ground = ground(problem, options, asked.awake, reached);
+    let ground = match ground(problem, options, asked.awake, reached, limits) {
+        Ok(ground) => ground,
+        Err(stop) => return stopped_while_grounding(stop, limits),
+    };
     match search(&ground.task, options.effort, limits) {
         Answer::Solved {
             actions,
@@ -306,7 +310,7 @@ fn search_in(asked: Asked<'_>, reached: &Reached, limits: &mut Limits<'_>) -> Ou
             let spares = Some(options.spares);
             let expanded = limits.expanded();
             let reason =
-                reason::why_unsolvable(problem, options, spares, reached, &ground, expanded);
+                reason::why_unsolvable(problem, options, spares, reached, Some(&ground), expanded);
             Outcome::without_plan(Status::Unsolvable, reason, expanded)
         }
         Answer::Stopped(stop) => {
@@ -352,7 +356,13 @@ fn raised(problem: &Problem, options: &Options) -> Vec<(usize, Environment, f64)
 }
 
 /// The ground task, in which some steps are dearer than their rules say.
-fn ground(problem: &Problem, options: &Options, awake: &[bool], reached: &Reached) -> Ground {
+fn ground(
+    problem: &Problem,
+    options: &Options,
+    awake: &[bool],
+    reached: &Reached,
+    limits: &mut Limits<'_>,
+) -> Result<Ground, StopReason> {
     let raised = raised(problem, options);
     let extra = |instance: &Instance| -> f64 {
         let bound = problem.program.operators[instance.operator].bound;
@@ -368,6 +378,7 @@ fn ground(problem: &Problem, options: &Options, awake: &[bool], reached: &Reache
         awake,
         reached,
         &extra,
+        limits,
     )
 }
 
@@ -377,12 +388,12 @@ fn prove(problem: &Problem, options: &Options, limits: &mut Limits<'_>) -> Optio
     let reached = problem
         .reach(&awake, Scope::All(MANY_ACTIONS), limits)
         .ok()?;
-    let ground = ground(problem, options, &awake, &reached);
+    let ground = ground(problem, options, &awake, &reached, limits).ok()?;
     if reached.overflow || reached.truncated || Reachability::new(&ground.task).goal {
         return None;
     }
     let expanded = limits.expanded();
-    let reason = reason::why_unsolvable(problem, options, None, &reached, &ground, expanded);
+    let reason = reason::why_unsolvable(problem, options, None, &reached, Some(&ground), expanded);
     Some(Outcome::without_plan(Status::Unsolvable, reason, expanded))
 }
 

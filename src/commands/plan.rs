@@ -92,7 +92,7 @@ fn by_rules(
         ..Options::default()
     };
     let mut written = None;
-    if arguments.write_pddl.is_some() || arguments.output.is_some() {
+    if arguments.write_pddl.is_some() {
         written = match pddl::write(&grammar, &snapshot, &goal, &options, limits) {
             Ok(written) => Some(written),
             // Planning says the same of these.

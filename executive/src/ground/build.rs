@@ -11,7 +11,8 @@ use super::choices::combinations;
 use super::facts::Facts;
 use super::program::{Link, Object, Operator, Place, Program};
 use super::reach::{Instance, Reached};
-use super::value::{amount, evaluate};
+use super::value::amount;
+use crate::search::{Limits, StopReason};
 use crate::task::{Action, Effect, Fact, Formula, Micro, Task, keep, micro, relevant};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeMap;
@@ -63,6 +64,9 @@ struct Builder<'a> {
 type Changes = BTreeMap<Formula, (Vec<Atom>, Vec<Atom>)>;
 
 /// Builds the task. `awake` tells which operators are not dormant at first.
+///
+/// # Errors
+/// [`StopReason::Time`], [`StopReason::Memory`].
 pub(crate) fn build(
     program: &Program,
     goal: &Operator,
@@ -70,7 +74,8 @@ pub(crate) fn build(
     awake: &[bool],
     reached: &Reached,
     extra: &Extra<'_>,
-) -> Ground {
+    limits: &mut Limits<'_>,
+) -> Result<Ground, StopReason> {
     let mut builder = Builder {
         program,
         initial,
@@ -90,42 +95,95 @@ pub(crate) fn build(
     let wanted: Vec<Formula> = wanted.collect();
     let wanted = Formula::any(wanted);
     let mut drafts: Vec<(usize, Formula, Changes, Micro, Micro)> = Vec::new();
-    let mut notes = Vec::new();
+    let mut without_cost = vec![false; program.operators.len()];
+    let mut bytes = reached.bytes;
     for (index, instance) in reached.instances.iter().enumerate() {
         let operator = &program.operators[instance.operator];
         let more = extra(instance);
-        let value = evaluate(&operator.cost, &mut |place| {
-            initial.value(place.at(&instance.objects)).cloned()
-        });
-        let Some(cost) = amount(value.as_ref()) else {
-            let note = format!(
-                "the cost of rule `{}` has no value somewhere",
-                operator.name
-            );
-            if !notes.contains(&note) {
-                notes.push(note);
+        let objects = &instance.objects;
+        let mut priced = Vec::new();
+        for (choice, value) in combinations(&operator.cost, objects, &reached.facts, program) {
+            match amount(value.as_ref()) {
+                Some(cost) => priced.push((choice, cost)),
+                None => without_cost[instance.operator] = true,
             }
-            continue;
-        };
-        if more.is_infinite() {
+        }
+        if more.is_infinite() || priced.is_empty() {
             continue;
         }
         let (precondition, changes) = builder.action(instance);
-        if precondition != Formula::FALSE {
-            drafts.push((
-                index,
-                precondition,
-                changes,
-                micro(cost),
-                micro(cost + more),
-            ));
+        // What the rule costs may depend on values that rules assign: an action for each choice of them.
+        for (choice, cost) in priced {
+            let precondition = match choice.as_slice() {
+                [] => precondition.clone(),
+                _ => Formula::all([precondition.clone(), builder.choice(&choice, true)]),
+            };
+            if precondition != Formula::FALSE {
+                bytes += bytes_of(&precondition, &changes);
+                let (cost, raised) = (micro(cost), micro(cost + more));
+                drafts.push((index, precondition, changes.clone(), cost, raised));
+            }
+        }
+        if index % 256 == 0 {
+            limits.check(bytes)?;
         }
     }
+    let without_cost = program.operators.iter().zip(without_cost);
+    let without_cost = without_cost.filter(|(_, without)| *without);
+    let notes = without_cost
+        .map(|(operator, _)| {
+            let rule = &operator.name;
+            format!("the cost of rule `{rule}` has no value somewhere")
+        })
+        .collect();
     let mut actions = Vec::new();
     let (mut which, mut costs) = (Vec::new(), Vec::new());
     for (index, precondition, changes, cost, raised) in drafts {
+        let effects = builder.effects(changes);
+        if effects.is_empty() {
+            continue;
+        }
+        let operator = &program.operators[reached.instances[index].operator];
+        let mut action = Action::new(precondition, effects, raised);
+        action.success = operator.success;
+        actions.push(action);
+        which.push(index);
+        costs.push(cost);
+    }
+    let relevant = relevant(builder.atoms.len(), &wanted, &actions);
+    let holding = |&fact: &Fact| builder.holds_at_first(builder.atoms[fact as usize]);
+    let first: Vec<Fact> = (0..builder.atoms.len() as Fact).filter(holding).collect();
+    limits.check(bytes)?;
+    Ok(Ground {
+        task: Task::new(
+            builder.atoms.len(),
+            &first,
+            wanted,
+            keep(actions, &relevant),
+        ),
+        actions: keep(which, &relevant),
+        costs: keep(costs, &relevant),
+        atoms: builder.atoms,
+        notes,
+    })
+}
+
+/// About what an action takes once it is one, with what searches keep of it.
+fn bytes_of(precondition: &Formula, changes: &Changes) -> usize {
+    let mut parts = 0;
+    precondition.each_literal(&mut |_| parts += 1);
+    for (condition, (come, gone)) in changes {
+        condition.each_literal(&mut |_| parts += 1);
+        parts += 2 + come.len() + gone.len();
+    }
+    400 + 100 * parts
+}
+
+impl<'a> Builder<'a> {
+    /// The changes of an action on the facts that have numbers.
+    fn effects(&self, changes: Changes) -> Vec<Effect> {
         let number = |atoms: Vec<Atom>| -> Vec<Fact> {
-            let known = atoms.iter().filter_map(|atom| builder.numbers.get(atom));
+            let known = atoms.iter().filter_map(|atom| self.numbers.get(atom));
             let mut facts: Vec<Fact> = known.copied().collect();
             facts.sort_unstable();
             facts.dedup();
@@ -142,34 +200,9 @@ pub(crate) fn build(
                 });
             }
         }
-        if effects.is_empty() {
-            continue;
-        }
-        let operator = &program.operators[reached.instances[index].operator];
-        let mut action = Action::new(precondition, effects, raised);
-        action.success = operator.success;
-        actions.push(action);
-        which.push(index);
-        costs.push(cost);
+        effects
     }
-    let relevant = relevant(builder.atoms.len(), &wanted, &actions);
-    let holding = |&fact: &Fact| builder.holds_at_first(builder.atoms[fact as usize]);
-    let first: Vec<Fact> = (0..builder.atoms.len() as Fact).filter(holding).collect();
-    Ground {
-        task: Task::new(
-            builder.atoms.len(),
-            &first,
-            wanted,
-            keep(actions, &relevant),
-        ),
-        actions: keep(which, &relevant),
-        costs: keep(costs, &relevant),
-        atoms: builder.atoms,
-        notes,
-    }
-}
 
-impl<'a> Builder<'a> {
     fn action(&mut self, instance: &Instance) -> (Formula, Changes) {
         let number = instance.operator;
         let program = self.program;

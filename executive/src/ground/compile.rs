@@ -430,6 +430,9 @@ fn analyse(program: &mut Program, goal: &Operator) {
         for test in &operator.tests {
             domains_and_reads(test, &mut program.types, &mut read);
         }
+        operator
+            .cost
+            .each_place(&mut |place| read[usize::from(place.attribute())] = true);
         operator.each_change(&mut |change| changes.push(change.clone()));
     }
     for change in &changes {

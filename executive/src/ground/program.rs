@@ -203,7 +203,7 @@ pub(crate) struct Program {
     pub(crate) types_change: bool,
     /// Whether a rule refuses to delete nodes that have links.
     pub(crate) strict: bool,
-    /// Attributes that rules assign and conditions or assigned values read.
+    /// Attributes that rules assign and conditions, costs or assigned values read.
     pub(crate) assigned: Vec<bool>,
     /// Rules that no plan can use, and why.
     pub(crate) notes: Vec<String>,

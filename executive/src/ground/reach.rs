@@ -57,6 +57,8 @@ pub(crate) struct Reached {
     pub(crate) awake: Vec<bool>,
     /// A place had more values than are followed.
     pub(crate) truncated: bool,
+    /// About how many bytes all of this takes.
+    pub(crate) bytes: usize,
 }
 
 /// A fact that comes to hold.
@@ -96,8 +98,6 @@ struct Reaching<'a> {
     open_ended: Vec<bool>,
     arrivals: VecDeque<Arrival>,
     scope: Scope,
-    /// About how many bytes the bindings take.
-    bytes: usize,
     reached: Reached,
 }
 
@@ -142,7 +142,6 @@ pub(crate) fn reach(
         gains: &gains,
         arrivals: VecDeque::new(),
         scope,
-        bytes: 0,
         initial,
         program,
         goal,
@@ -157,6 +156,7 @@ pub(crate) fn reach(
             goals: Vec::new(),
             awake,
             truncated: false,
+            bytes: 0,
         },
     };
     // Types first: until links are there, few bindings have all that they need.
@@ -278,7 +278,7 @@ impl<'a> Reaching<'a> {
             }
         };
         for (number, index) in waiting.unwrap_or_default() {
-            limits.check(self.bytes)?;
+            limits.check(self.reached.bytes)?;
             let is_rule = number < self.program.operators.len();
             if is_rule && matches!(self.scope, Scope::Steps(_)) {
                 continue;
@@ -292,7 +292,7 @@ impl<'a> Reaching<'a> {
             if only.is_some_and(|objects| !arrival.is_among(objects)) {
                 continue;
             }
-            let mut found = Found::new(self.bytes, only, limits);
+            let mut found = Found::new(self.reached.bytes, only, limits);
             match arrival {
                 Arrival::Type(object, _) => {
                     plan.with_variable(operator, facts, index, object, &mut found);
@@ -321,7 +321,7 @@ impl<'a> Reaching<'a> {
                 }
                 self.seen.insert((number, environment.clone()));
                 // Seen, and kept as an instance with what it changes.
-                self.bytes += 4 * bytes_of_binding(environment.len());
+                self.reached.bytes += 4 * bytes_of_binding(environment.len());
             }
             let impossible = |environment: &mut Environment| {
                 let forbidden = operator.absent.iter().any(|link| {
@@ -376,7 +376,7 @@ impl<'a> Reaching<'a> {
                 if self.arrivals.len() == queued && !self.open_ended[instance.operator] {
                     continue;
                 }
-                self.bytes += 2 * bytes_of_binding(instance.objects.len());
+                self.reached.bytes += 2 * bytes_of_binding(instance.objects.len());
             }
             self.reached.instances.push(instance);
         }

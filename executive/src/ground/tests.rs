@@ -83,6 +83,10 @@ fn brute_force(grammar: &Grammar, start: &State, goal: &Goal) -> Result<Option<f
                 .map(Result::unwrap)
                 .collect();
             for binding in matches {
+                // What has no cost is not planned with.
+                let Ok(price) = grammar.cost(&snapshot, rule, &binding) else {
+                    continue;
+                };
                 let mut next = state.graph(grammar);
                 let mut transaction = Transaction::new();
                 transaction.apply_rule(&rule.name, binding.to_refs());
@@ -90,7 +94,7 @@ fn brute_force(grammar: &Grammar, start: &State, goal: &Goal) -> Result<Option<f
                     continue;
                 }
                 let next = State::of(&next);
-                let cost = cost + rule.cost.as_number().unwrap() as u64;
+                let cost = cost + price as u64;
                 if best.get(&next).is_none_or(|&known| cost < known) {
                     best.insert(next.clone(), cost);
                     open.push(Reverse((cost, next)));
@@ -170,11 +174,16 @@ fn rule(number: usize) -> impl Strategy<Value = String> {
                 links(variables, 1, 3),
                 prop::option::weighted(0.3, formula(last)),
                 prop::collection::vec(effect(last), 0..2),
-                (1..4u8, prop::bool::weighted(0.15), prop::bool::weighted(0.5)),
+                (1..4u8, prop::bool::weighted(0.2)),
+                (prop::bool::weighted(0.15), prop::bool::weighted(0.5)),
             )
         })
-        .prop_map(move |(types, left, right, condition, effects, extra)| {
-            let (cost, deletes, strict) = extra;
+        .prop_map(move |(types, left, right, condition, effects, cost, extra)| {
+            let (deletes, strict) = extra;
+            let cost = match cost {
+                (cost, false) => format!("active({cost})"),
+                (cost, true) => format!("active(1) cost(+ {cost} a.level)"),
+            };
             let nodes: Vec<String> = VARIABLES
                 .iter()
                 .zip(&types)
@@ -199,7 +208,7 @@ fn rule(number: usize) -> impl Strategy<Value = String> {
                 format!("effect {{ {} }}", effects.join(" "))
             };
             format!(
-                "{strict}r{number} : active({cost}) {{ {{ {} {left} }} => {{ {} {} }} {condition} {effects} }}",
+                "{strict}r{number} : {cost} {{ {{ {} {left} }} => {{ {} {} }} {condition} {effects} }}",
                 nodes.join(" "),
                 nodes[..kept].join(" "),
                 right.join(" "),

@@ -210,24 +210,21 @@ fn written(definition: &Definition, predicate: usize, objects: &[u32]) -> String
 /// those of [`write()`], for a plan over the rules of a grammar.
 pub fn plan_file(outcome: &Outcome, names: Option<&Written>) -> String {
     let mut text = String::new();
-    for step in &outcome.steps {
-        match names.and_then(|names| names.action(&step.rule, &step.arguments)) {
-            // Writing to a string does not fail.
-            Some(name) => {
-                let _ = writeln!(text, "({name})");
-            }
-            None => {
-                let words = std::iter::once(&step.rule).chain(&step.arguments);
-                let words: Vec<&str> = words.map(String::as_str).collect();
-                let _ = writeln!(text, "({})", words.join(" "));
-            }
+    let mut cost = outcome.cost.unwrap_or_default();
+    let mut line = |words: &str| {
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "({words})");
+    };
+    if let Some(written) = names.and_then(|names| names.plan(outcome)) {
+        written.into_iter().for_each(&mut line);
+    } else {
+        for step in &outcome.steps {
+            let words = std::iter::once(&step.rule).chain(&step.arguments);
+            let words: Vec<&str> = words.map(String::as_str).collect();
+            line(&words.join(" "));
         }
     }
-    let mut cost = outcome.cost.unwrap_or_default();
     if let Some(names) = names {
-        if let Some(name) = names.last_step(outcome) {
-            let _ = writeln!(text, "({name})");
-        }
         cost *= names.scale;
     }
     let unit = outcome

@@ -29,11 +29,13 @@ pub struct Written {
     /// What the text does not say.
     pub notes: Vec<String>,
     task: Task,
-    /// Names of actions and their numbers in the task, by rule and arguments.
-    actions: BTreeMap<(String, Vec<String>), (String, usize)>,
+    actions: Actions,
     /// Actions that stand for the ways in which the goal may hold, where there are several.
     ends: Vec<(String, Formula)>,
 }
+
+/// Names of actions and their numbers in the task, by rule and arguments.
+type Actions = BTreeMap<(String, Vec<String>), Vec<(String, usize)>>;
 
 /// Why there is no text.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -50,24 +52,24 @@ pub enum WriteError {
 }
 
 impl Written {
-    /// What the action of a rule with these arguments is called.
-    pub(super) fn action(&self, rule: &str, arguments: &[String]) -> Option<&str> {
-        let key = (rule.to_owned(), arguments.to_vec());
-        self.actions.get(&key).map(|(name, _)| name.as_str())
-    }
-
-    /// The action that ends a plan, where the goal may hold in several ways.
-    pub(super) fn last_step(&self, outcome: &Outcome) -> Option<&str> {
+    /// The actions that a plan's steps are, and the one that ends it where the goal may hold in several ways.
+    pub(super) fn plan(&self, outcome: &Outcome) -> Option<Vec<&str>> {
         let (mut state, mut next) = (self.task.initial().to_vec(), State::new());
+        let mut names = Vec::new();
         for step in &outcome.steps {
             let key = (step.rule.clone(), step.arguments.clone());
-            let (_, action) = self.actions.get(&key)?;
+            // Several where the cost depends on values that rules assign.
+            let mut same = self.actions.get(&key)?.iter();
+            let (name, action) =
+                same.find(|(_, action)| self.task.is_applicable(&state, *action))?;
             self.task.successor(&state, *action, &mut next);
             std::mem::swap(&mut state, &mut next);
+            names.push(name.as_str());
         }
         let mut ends = self.ends.iter();
-        ends.find(|(_, goal)| goal.holds(&state))
-            .map(|(name, _)| name.as_str())
+        let end = ends.find(|(_, goal)| goal.holds(&state));
+        names.extend(end.map(|(name, _)| name.as_str()));
+        Some(names)
     }
 }
 
@@ -168,9 +170,11 @@ pub fn write(
         &awake,
         &reached,
         &|_| 0.0,
-    );
+        limits,
+    )
+    .map_err(WriteError::Stopped)?;
     let mut writer = Writer::new(&problem, &reached, &ground);
-    let mut actions = BTreeMap::new();
+    let mut actions = Actions::new();
     let mut text = String::new();
     let scale = scale(ground.task.actions());
     for (index, action) in ground.task.actions().iter().enumerate() {
@@ -199,7 +203,8 @@ pub fn write(
         effects.push(format!("(increase (total-cost) {cost})"));
         let precondition = writer.conjunction(&action.precondition);
         push_action(&mut text, &name, &precondition, &effects);
-        actions.insert((rule, arguments), (name, index));
+        let same = actions.entry((rule, arguments)).or_default();
+        same.push((name, index));
     }
     let goal = ground.task.goal();
     let mut ends = Vec::new();
@@ -217,22 +222,37 @@ pub fn write(
             ends.push((name, way));
         }
     }
+    // An empty goal makes some planners look for axioms.
+    let there = *goal == Formula::TRUE;
+    if there {
+        "(and (reached))".clone_into(&mut wanted);
+    }
     // Some readers want a predicate and an action, even where none is needed.
-    if !is_plain(goal) || text.is_empty() || writer.predicates.is_empty() {
+    if there || !is_plain(goal) || text.is_empty() || writer.predicates.is_empty() {
         writer.predicates.insert("reached".to_owned(), 0);
     }
     if text.is_empty() {
         let effects = ["(reached)", "(increase (total-cost) 0)"].map(str::to_owned);
         push_action(&mut text, "stay", "(and (reached))", &effects);
     }
+    let notes = notes(&problem, &reached, &ground);
+    Ok(Written {
+        domain: writer.domain(&text, scale, &notes),
+        problem: writer.problem(&wanted, there),
+        scale: scale as f64,
+        notes,
+        task: ground.task.clone(),
+        actions,
+        ends,
+    })
+}
+
+/// What the text does not say.
+fn notes(problem: &Problem, reached: &Reached, ground: &Ground) -> Vec<String> {
     let mut notes = problem.program.notes.clone();
     notes.extend(ground.notes.iter().cloned());
-    if ground
-        .task
-        .actions()
-        .iter()
-        .any(|action| action.success < 1.0)
-    {
+    let mut actions = ground.task.actions().iter();
+    if actions.any(|action| action.success < 1.0) {
         let note = "rules that may fail are written with their own costs alone: what a failure \
                     wastes depends on the steps before it, which PDDL cannot say";
         notes.push(note.to_owned());
@@ -240,15 +260,7 @@ pub fn write(
     if reached.truncated {
         notes.push("attributes were followed through their first values only".to_owned());
     }
-    Ok(Written {
-        domain: writer.domain(&text, scale, &notes),
-        problem: writer.problem(&wanted),
-        scale: scale as f64,
-        notes,
-        task: ground.task.clone(),
-        actions,
-        ends,
-    })
+    notes
 }
 
 /// The least power of ten that makes all costs whole.
@@ -418,8 +430,11 @@ impl<'a> Writer<'a> {
         text + ")\n"
     }
 
-    fn problem(&self, goal: &str) -> String {
+    fn problem(&self, goal: &str, there: bool) -> String {
         let mut text = "(define (problem world)\n  (:domain rules)\n  (:init".to_owned();
+        if there {
+            text.push_str("\n    (reached)");
+        }
         for (fact, name) in (0..).zip(&self.facts) {
             if holds(self.ground.task.initial(), fact) {
                 let _ = write!(text, "\n    {name}");

@@ -10,7 +10,7 @@ mod present;
 use super::narrow::Relaxed;
 use super::{Asked, Outcome, Status, ground, raised, reason, search_in, solved};
 use crate::ground::{
-    Environment, Facts, Found, Instance, Join, Operator, Problem, Scope, amount, evaluate,
+    Environment, Facts, Found, Instance, Join, Operator, Place, Problem, Scope, amount, evaluate,
     is_admitted, lacking,
 };
 use crate::search::{Limits, StopReason};
@@ -121,12 +121,22 @@ fn of_steps(asked: Asked<'_>, steps: &[Instance], expanded: u64) -> Option<Outco
     let problem = asked.problem;
     let scope = Scope::Steps(steps.to_vec());
     // So little work that no limit is asked.
-    let reached = problem.reach(asked.awake, scope, &mut Limits::new()).ok()?;
-    let ground = ground(problem, asked.options, asked.awake, &reached);
-    // Steps that cannot matter to the goal are no actions.
-    let actions = 0..steps.len();
-    let actions = actions.filter_map(|step| ground.actions.iter().position(|&i| i == step));
-    let actions: Vec<usize> = actions.collect();
+    let limits = &mut Limits::new();
+    let reached = problem.reach(asked.awake, scope, limits).ok()?;
+    let ground = ground(problem, asked.options, asked.awake, &reached, limits).ok()?;
+    let (mut state, mut next) = (ground.task.initial().to_vec(), Vec::new());
+    let mut actions = Vec::new();
+    for step in 0..steps.len() {
+        // Steps that cannot matter to the goal are no actions; some are several, by what they cost.
+        let mut same = (0..).zip(&ground.actions);
+        let applicable = same
+            .find(|&(action, &index)| index == step && ground.task.is_applicable(&state, action));
+        if let Some((action, _)) = applicable {
+            ground.task.successor(&state, action, &mut next);
+            std::mem::swap(&mut state, &mut next);
+            actions.push(action);
+        }
+    }
     ground.task.plan_cost(&actions)?;
     Some(solved(
         problem, &reached, &ground, &actions, false, expanded,
@@ -324,8 +334,8 @@ impl Search<'_, '_, '_> {
     /// Whether a rule has a cost at a binding, and is not excluded there.
     fn is_allowed(&self, number: usize, objects: &Environment) -> bool {
         let operator = &self.problem.program.operators[number];
-        let initial = &self.problem.world.facts;
-        let mut read = |place: crate::ground::Place| initial.value(place.at(objects)).cloned();
+        let facts = self.present.facts();
+        let mut read = |place: Place| facts.value(place.at(objects)).cloned();
         let mut excluded = self.excluded.iter();
         amount(evaluate(&operator.cost, &mut read).as_ref()).is_some()
             && !excluded.any(|(operator, at)| *operator == number && objects.starts_with(at))

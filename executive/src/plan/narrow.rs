@@ -3,7 +3,7 @@
 //! nodes of that way, then also on their neighbours. This file guarantees that what it gives is a plan
 //! of the rules; it never says that there is none unless even that way does not exist.
 
-use super::{Asked, Outcome, Status, ground, reason, search_in};
+use super::{Asked, Outcome, Status, reason, search_in};
 use crate::ground::{Arrival, Atom, Facts, Link, Object, Problem, Reached, Scope};
 use crate::search::{Limits, StopReason};
 use fixedbitset::FixedBitSet;
@@ -31,9 +31,8 @@ pub(super) fn plan(
         if way.truncated {
             return Ok(None);
         }
-        let ground = ground(problem, options, awake, &way);
         let (spares, expanded) = (Some(options.spares), limits.expanded());
-        let reason = reason::why_unsolvable(problem, options, spares, &way, &ground, expanded);
+        let reason = reason::why_unsolvable(problem, options, spares, &way, None, expanded);
         let outcome = Outcome::without_plan(Status::Unsolvable, reason, expanded);
         return Ok(Some(outcome));
     }

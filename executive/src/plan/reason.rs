@@ -87,17 +87,18 @@ pub(super) fn why_unsolvable(
     options: &Options,
     spares: Option<usize>,
     reached: &Reached,
-    ground: &Ground,
+    ground: Option<&Ground>,
     expanded: u64,
 ) -> String {
     let mut reasons = problem.unreachable(reached);
-    if reasons.is_empty() && !Reachability::new(&ground.task).goal {
+    let hopeless = ground.filter(|ground| !Reachability::new(&ground.task).goal);
+    if let Some(ground) = hopeless.filter(|_| reasons.is_empty()) {
         reasons.extend(unreachable_literals(problem, ground));
     }
     if reasons.is_empty() {
         reasons.push(if reached.goals.is_empty() {
             "no choice of nodes fits all of the goal at once".to_owned()
-        } else if !Reachability::new(&ground.task).goal {
+        } else if hopeless.is_some() {
             "no rule brings about what the goal's condition asks for".to_owned()
         } else {
             no_order(expanded)
@@ -105,7 +106,11 @@ pub(super) fn why_unsolvable(
     }
     let truncated = reached.truncated;
     append_reservations(&mut reasons, problem, options, spares, truncated);
-    reasons.extend(ground.notes.iter().cloned());
+    reasons.extend(
+        ground
+            .into_iter()
+            .flat_map(|ground| ground.notes.iter().cloned()),
+    );
     reasons.join("; ")
 }
 
