@@ -110,15 +110,20 @@ impl Draft {
         self.words()
     }
 
-    /// With values that meet all that is asked, if any were found.
-    pub(super) fn with_values(mut self, schema: Option<&Schema>) -> Option<Self> {
+    /// With values that meet all that is asked, if any were found; and what it cost, in comparisons looked at.
+    pub(super) fn with_values(mut self, schema: Option<&Schema>) -> (Option<Self>, u64) {
         if self.asked.is_empty() {
-            return Some(self);
+            return (Some(self), 0);
         }
         let links = &self.links;
         let nowhere = |key: &Key| matches!(&key.0, Owner::Link(link) if !links.contains(link));
-        self.values = Rc::new(values(&self.asked, schema, &nowhere)?);
-        Some(self)
+        let (found, tried) = values(&self.asked, schema, &nowhere);
+        let cost = (tried + 1) * self.asked.len() as u64;
+        let with = found.map(|found| {
+            self.values = Rc::new(found);
+            self
+        });
+        (with, cost)
     }
 
     /// Asks that what effects assign has a value: a rule cannot be applied where one has none.

@@ -10,7 +10,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 /// So many values are tried for all attributes together.
-const TRIES: u64 = 20_000;
+const TRIES: u64 = 2_500;
+/// What taking up values for one attribute costs, in values tried.
+const CANDIDATES_COST: u64 = 20;
 /// So many are taken up for one attribute.
 const CANDIDATES: usize = 60;
 
@@ -130,12 +132,12 @@ struct Search<'a> {
     left: u64,
 }
 
-/// Values that meet all that is asked, if any were found. Attributes of what is `nowhere` are missing.
+/// Values that meet all that is asked, if any were found, and how many were tried. Attributes of what is `nowhere` are missing.
 pub(super) fn values(
     asked: &[Asked],
     schema: Option<&Schema>,
     nowhere: &dyn Fn(&Key) -> bool,
-) -> Option<Values> {
+) -> (Option<Values>, u64) {
     let mut order: Vec<&Key> = Vec::new();
     for key in asked.iter().flat_map(Asked::keys) {
         if !order.contains(&key) {
@@ -156,15 +158,14 @@ pub(super) fn values(
         chosen: BTreeMap::new(),
         left: TRIES,
     };
-    if !search.may(search.asked) || !search.choose(0) {
-        return None;
+    let found = search.may(search.asked) && search.choose(0);
+    let tried = TRIES - search.left;
+    if !found {
+        return (None, tried);
     }
     let chosen = search.chosen.into_iter();
-    Some(
-        chosen
-            .filter_map(|(key, value)| Some((key.clone(), value?)))
-            .collect(),
-    )
+    let values = chosen.filter_map(|(key, value)| Some((key.clone(), value?)));
+    (Some(values.collect()), tried)
 }
 
 impl Search<'_> {
@@ -179,6 +180,7 @@ impl Search<'_> {
         };
         let mut candidates = vec![None];
         if !(self.nowhere)(key) {
+            self.left = self.left.saturating_sub(CANDIDATES_COST);
             candidates.extend(self.candidates(key, &within).into_iter().map(Some));
         }
         for candidate in candidates {

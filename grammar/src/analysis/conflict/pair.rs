@@ -23,6 +23,8 @@ const DRAFT_LIMIT: usize = 4_096;
 const TRIAL: u64 = 3_000;
 /// What drawing what a formula asks for costs, or looking at it with others.
 const FORMULA: u64 = 200;
+/// What looking at a comparison costs where values are chosen.
+const COMPARISON: u64 = 300;
 /// More than this for one graph is not tried: quantifiers in it have too many combinations.
 const TRIAL_LIMIT: u64 = 100_000;
 
@@ -217,14 +219,19 @@ impl Pair<'_> {
         let looks = ways.looked_at() + looks * drafts.len() as u64;
         effort.spend(FORMULA * looks * nodes)?;
         let effects = &joint.first().effect;
-        let valued = |draft: Draft| {
+        let mut valued = Vec::new();
+        for draft in drafts {
             let asking = draft.clone().with_effects(effects, places, types);
-            asking
-                .with_values(self.schema)
-                .or_else(|| draft.with_values(self.schema))
-        };
-        let drafts = drafts.into_iter().filter_map(valued);
-        Ok(drafts.filter(|draft| may(draft, Drawn::Whole)).collect())
+            let (mut found, cost) = asking.with_values(self.schema);
+            effort.spend(COMPARISON * cost)?;
+            if found.is_none() {
+                let (without, cost) = draft.with_values(self.schema);
+                effort.spend(COMPARISON * cost)?;
+                found = without;
+            }
+            valued.extend(found.filter(|draft| may(draft, Drawn::Whole)));
+        }
+        Ok(valued)
     }
 
     /// Tries both rules in the draft, made in an empty graph; `None` where the first does not disable the second.

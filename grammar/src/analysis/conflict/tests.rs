@@ -372,7 +372,7 @@ struct Tally {
 
 impl Tally {
     fn add(&mut self, grammar: &Grammar, models: &[Model]) {
-        let told = grammar.conflicts(None, crate::EFFORT_LIMIT / 20);
+        let told = grammar.conflicts(None, crate::EFFORT_LIMIT / 4);
         for first in &grammar.rules {
             for second in &grammar.rules {
                 let is = |one: &str, two: &str| *first.name == *one && *second.name == *two;
