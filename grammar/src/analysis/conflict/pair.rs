@@ -24,7 +24,7 @@ const TRIAL: u64 = 3_000;
 /// What drawing what a formula asks for costs, or looking at it with others.
 const FORMULA: u64 = 200;
 /// What looking at a comparison costs where values are chosen.
-const COMPARISON: u64 = 300;
+const COMPARISON: u64 = 100;
 /// More than this for one graph is not tried: quantifiers in it have too many combinations.
 const TRIAL_LIMIT: u64 = 100_000;
 
