@@ -31,6 +31,11 @@ use serde::{Deserialize, Serialize};
 pub const MOST_PAIRS: usize = 200_000_000;
 /// The side of the square cells by which pairs are counted: pairs within a cell and its neighbours, metres.
 pub const NEARBY: f64 = 8.0;
+/// Where more people than this stand in three by three cells of half a metre, ninety to a square metre, [`Method::Facing`]
+/// does not look for groups.
+pub const MOST_ON_A_SPOT: usize = 200;
+/// The side of those cells, metres.
+const SPOT: f64 = 0.5;
 
 /// How groups are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -79,15 +84,27 @@ pub struct Grouping {
 
 /// People stand closer than bodies can, and too many of them, to look for groups among.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "{count} people stand too close to look for groups among them: {pairs} pairs within some \
-     {NEARBY} m of each other, where at most {MOST_PAIRS} are compared"
-)]
-pub struct TooCrowded {
-    /// How many people there are.
-    pub count: usize,
-    /// How many pairs of them stand in one cell of [`NEARBY`] metres, or in two neighbouring ones.
-    pub pairs: usize,
+pub enum TooCrowded {
+    /// Everywhere.
+    #[error(
+        "{count} people stand too close to look for groups among them: {pairs} pairs within some \
+         {NEARBY} m of each other, where at most {MOST_PAIRS} are compared"
+    )]
+    Pairs {
+        /// How many people there are.
+        count: usize,
+        /// How many pairs of them stand in one cell of [`NEARBY`] metres, or in two neighbouring ones.
+        pairs: usize,
+    },
+    /// Somewhere, for [`Method::Facing`], which weighs each pair of them anew with each that joins.
+    #[error(
+        "{most} people stand within 1.5 m of each other, where {MOST_ON_A_SPOT} are at most looked at: no bodies stand so close \
+         (`gaussian_clustering` takes them)"
+    )]
+    Spot {
+        /// How many people stand in three by three cells of half a metre.
+        most: usize,
+    },
 }
 
 impl Grouping {
@@ -122,7 +139,11 @@ impl Grouping {
         let pairs = Near::new(&places, NEARBY).pairs();
         if pairs > MOST_PAIRS {
             let count = poses.len();
-            return Err(TooCrowded { count, pairs });
+            return Err(TooCrowded::Pairs { count, pairs });
+        }
+        let most = Near::new(&places, SPOT).most();
+        if self.method == Method::Facing && most > MOST_ON_A_SPOT {
+            return Err(TooCrowded::Spot { most });
         }
         let mut groups = match self.method {
             Method::Facing => self.facing.groups(&poses),

@@ -304,7 +304,11 @@ fn spaces() -> Result<Vec<Row>, Failure> {
         }
         fronts.push((value, share));
         let individual = mood().apply(FourSided::HALL, &values);
-        own = own && (widths.front / widths.rear - individual.front / individual.rear).abs() > 1e-6;
+        let sides = widths.sides().into_iter().zip(individual.sides());
+        own = own
+            && sides
+                .into_iter()
+                .any(|(ours, theirs)| (ours - theirs).abs() > 1e-6);
     }
     fronts.sort_by(|a, b| a.0.total_cmp(&b.0));
     let smaller = fronts.windows(2).all(|pair| pair[1].1 < pair[0].1);

@@ -129,7 +129,7 @@ struct Scene<'a> {
     people: &'a [Isometry2<f64>],
     places: &'a [Point2<f64>],
     crowd: Crowd,
-    /// Of the pairs asked for so far, by the smaller index: the greater one, and the bond.
+    /// Of the pairs asked for so far, by the smaller index: the greater ones in order, each with the bond.
     bonds: RefCell<Vec<Vec<(usize, f64)>>>,
     beside: Vec<Vec<usize>>,
 }
@@ -139,12 +139,13 @@ impl Scene<'_> {
         let (a, b) = (a.min(b), a.max(b));
         let mut known = self.bonds.borrow_mut();
         let known = &mut known[a];
-        if let Some((_, bond)) = known.iter().find(|(other, _)| *other == b) {
-            return *bond;
-        }
+        let place = match known.binary_search_by_key(&b, |(other, _)| *other) {
+            Ok(place) => return known[place].1,
+            Err(place) => place,
+        };
         let crowd = self.crowd(a, b);
         let bond = self.rules.pair(&self.people[a], &self.people[b], crowd);
-        known.push((b, bond));
+        known.insert(place, (b, bond));
         bond
     }
 

@@ -43,6 +43,13 @@ impl<'a> Near<'a> {
         ordered / 2
     }
 
+    /// The greatest number of people who stand in a cell and those that touch it.
+    pub(super) fn most(&self) -> usize {
+        let blocks = self.cells.keys();
+        let counts = blocks.map(|cell| self.block(*cell).map(Vec::len).sum());
+        counts.max().unwrap_or_default()
+    }
+
     /// The people of a cell and of those that touch it.
     fn block(&self, [column, row]: [i64; 2]) -> impl Iterator<Item = &Vec<usize>> + '_ {
         (row.saturating_sub(1)..=row.saturating_add(1))

@@ -116,6 +116,10 @@ fn more_people_than_bodies_fit_are_refused() {
         "20001 people stand too close to look for groups among them: 200010000 pairs within some \
          8 m of each other, where at most 200000000 are compared"
     );
+    let error = Grouping::default().groups(&people[..201]).unwrap_err();
+    assert_eq!(error, TooCrowded::Spot { most: 201 });
+    assert_eq!(groups(Method::Facing, &people[..200]).len(), 1);
+    assert_eq!(groups(Method::GaussianClustering, &people[..201]).len(), 1);
 }
 
 #[test]
