@@ -135,6 +135,7 @@ pub fn social_mapping(mut session: Session, begin: Begin) -> Result<(), ProcessE
             Some(grid) => Some(grid.after(uncommitted.as_ref())),
             None => uncommitted,
         };
+        let mut withheld = false;
         if let Some(grid) = &uncommitted {
             if writer.is_none()
                 && let Some(world) = current(world(&snapshot))?.flatten()
@@ -142,13 +143,22 @@ pub fn social_mapping(mut session: Session, begin: Begin) -> Result<(), ProcessE
                 writer = Some(GridWriter::open(&mut session, world.id())?);
             }
             if let Some(writer) = &mut writer {
-                writer.give_out(grid, tick.time, &mut transaction)?;
+                let failure = match writer.give_out(grid, tick.time, &mut transaction) {
+                    Ok(()) => None,
+                    // It is the grid, not the graph: another one may have room.
+                    Err(error @ (LargeError::Schema(_) | LargeError::OutOfMemory { .. })) => {
+                        Some(error)
+                    }
+                    Err(error) => return Err(error.into()),
+                };
+                withheld = failure.is_some();
+                core.given_out(failure.as_ref());
             }
         } else if let Some(writer) = &mut writer {
             writer.confirm(tick.time, &mut transaction);
         }
         if session.submit(&transaction, tick.time)?.is_some() {
-            uncommitted = None;
+            uncommitted = uncommitted.filter(|_| withheld);
         } else if let Some(writer) = writer.as_mut().filter(|_| !transaction.is_empty()) {
             writer.unsaid();
         }

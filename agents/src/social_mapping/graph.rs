@@ -20,7 +20,7 @@ use super::rejection::Rejection;
 use super::scene::SceneError;
 use crate::grid::Region;
 use crate::grid::shared::GridUpdate;
-use dsr::{Node, Operation, Owner, Snapshot, Time, Transaction, Value};
+use dsr::{LargeError, Node, Operation, Owner, Snapshot, Time, Transaction, Value};
 use nalgebra::Point2;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -256,6 +256,8 @@ pub struct SocialMapping {
     updated: Option<Time>,
     /// Where the grid differs from the one given out last.
     unsent: Region,
+    /// Why the grid could not be given out.
+    withheld: Option<Rejection>,
     /// What was told last. As text: what is no number equals nothing, itself included.
     told: Vec<String>,
 }
@@ -274,8 +276,16 @@ impl SocialMapping {
             period,
             updated: None,
             unsent: Region::default(),
+            withheld: None,
             told: Vec::new(),
         })
+    }
+
+    /// Whether the grid of the last turn could be given out, and why not: the next turns tell.
+    pub fn given_out(&mut self, failure: Option<&LargeError>) {
+        self.withheld = failure.map(|error| Rejection::Grid {
+            problem: error.to_string(),
+        });
     }
 
     /// One turn at `now` on the graph as of `snapshot`. Where no map can be made the turn says why, and the next one
@@ -305,9 +315,13 @@ impl SocialMapping {
             self.mapper = mapper;
         }
         let mut scene = scene(snapshot, self.mapper.config())?;
-        scene
-            .rejected
-            .extend(self.settings.refused().iter().cloned());
+        scene.rejected.extend(
+            self.settings
+                .refused()
+                .iter()
+                .chain(&self.withheld)
+                .cloned(),
+        );
         let update = self.mapper.update(now, &scene)?;
         // Reading may fail yet, and the next update would not call the change a change.
         self.unsent = self.unsent.joined(&update.dirty);

@@ -80,6 +80,12 @@ pub enum Rejection {
         /// What is wrong.
         problem: String,
     },
+    /// The grid given out before is the last one.
+    #[error("the new social grid is not given out: {problem}")]
+    Grid {
+        /// Why.
+        problem: String,
+    },
     /// Nobody is in a group.
     #[error(transparent)]
     Groups(#[from] TooCrowded),
@@ -188,7 +194,7 @@ impl Rejection {
                 UsedBy::Activity(name) => Entered::Activity(name),
                 UsedBy::Settings => Entered::World,
             }),
-            Self::Settings { .. } | Self::Room { .. } => Some(Entered::World),
+            Self::Settings { .. } | Self::Grid { .. } | Self::Room { .. } => Some(Entered::World),
             Self::PersonPose { .. }
             | Self::PersonVelocity { .. }
             | Self::PersonRadius { .. }

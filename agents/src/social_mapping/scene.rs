@@ -112,13 +112,15 @@ pub enum SceneError {
     },
     /// The grid would be larger than [`MOST_CELLS`].
     #[error(
-        "the map's bounds {bounds:?} at {resolution} m a cell need more than {MOST_CELLS} cells"
+        "the map's bounds {bounds:?} at {resolution} m a cell need {cells} cells; a grid has at most {MOST_CELLS}"
     )]
     TooLarge {
         /// As given.
         bounds: [f64; 4],
         /// Side of a cell, metres.
         resolution: f64,
+        /// How many it would have.
+        cells: f64,
     },
     /// A wall has an end that is no place: leaving it out would open the map.
     #[error("wall {index} has an end that is no place within {FARTHEST:e} m")]
@@ -134,8 +136,25 @@ pub enum SceneError {
     },
 }
 
-/// The largest grid that is made: 100 MB of costs.
-pub const MOST_CELLS: f64 = 25e6;
+/// The largest grid that is made: the 16 MiB of costs that a large value has at the most where the schema says nothing else.
+pub const MOST_CELLS: f64 = 4_194_304.0;
+
+/// Whether a grid may have so many cells.
+///
+/// # Errors
+/// [`SceneError::TooLarge`].
+pub fn check_size(bounds: [f64; 4], resolution: f64) -> Result<(), SceneError> {
+    let [xmin, ymin, xmax, ymax] = bounds;
+    let cells = ((xmax - xmin) / resolution).ceil() * ((ymax - ymin) / resolution).ceil();
+    if cells > MOST_CELLS {
+        return Err(SceneError::TooLarge {
+            bounds,
+            resolution,
+            cells,
+        });
+    }
+    Ok(())
+}
 
 impl SocialScene {
     /// Whether a map can be made of the scene at `resolution` metres a cell.
@@ -145,9 +164,7 @@ impl SocialScene {
         if !bounds.iter().all(|b| b.abs() <= FARTHEST) || xmin >= xmax || ymin >= ymax {
             return Err(SceneError::Bounds { bounds });
         }
-        if ((xmax - xmin) / resolution).ceil() * ((ymax - ymin) / resolution).ceil() > MOST_CELLS {
-            return Err(SceneError::TooLarge { bounds, resolution });
-        }
+        check_size(bounds, resolution)?;
         if !(0.0..=LARGEST_BODY).contains(&self.robot_radius) {
             return Err(SceneError::RobotRadius {
                 radius: self.robot_radius,

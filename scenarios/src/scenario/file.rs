@@ -9,6 +9,7 @@ use super::{devices, people, schedule, space};
 use agents::human_observer;
 use agents::names::suggest;
 use agents::social_mapping::SocialConfig;
+use agents::social_mapping::scene::check_size;
 use dsr::Time;
 use jiff::Timestamp;
 use jiff::civil::{Date, DateTime, Time as ClockTime};
@@ -264,7 +265,7 @@ fn whole(table: &Table<'_>, text: &str, read: Read<'_>) -> Scenario {
     let missions = missions(table, &mut names, begin, read);
     let rules = file(table, "rules", "rules.aggl", read);
     let tracks = tracks(table);
-    let social = social(table);
+    let social = social(table, Some(bounds));
     check_names(table, &names);
     check_classes(table);
     let human_observer = human_observer(table);
@@ -401,7 +402,7 @@ pub fn parse_social(
         let problems = Problems::default();
         let title = "the settings".to_owned();
         let table = Table::new(document.get_ref(), 0..0, title, &problems);
-        let config = social(&table);
+        let config = social(&table, scenario.map(|scenario| scenario.bounds));
         check_classes(&table);
         if let Some(scenario) = scenario {
             let mut names = Names::new(text);
@@ -432,10 +433,20 @@ fn human_observer(scenario: &Table<'_>) -> human_observer::Config {
     config
 }
 
-/// The figures of social mapping; those not given have their defaults.
-fn social(scenario: &Table<'_>) -> SocialConfig {
+/// The figures of social mapping, for a world of these bounds; those not given have their defaults.
+fn social(scenario: &Table<'_>, bounds: Option<[f64; 4]>) -> SocialConfig {
     let config: SocialConfig = scenario.deserialize("social").unwrap_or_default();
-    for problem in config.problems() {
+    let problems = config.problems();
+    if problems.is_empty()
+        && let Some(Err(error)) = bounds.map(|bounds| check_size(bounds, config.resolution))
+    {
+        let message = error.to_string();
+        let given = ["bounds", "social.resolution"];
+        let place = given[usize::from(!scenario.has("bounds"))];
+        let kind = ProblemKind::Figure { message };
+        scenario.problems.add(kind, scenario.span_of(place));
+    }
+    for problem in problems {
         let message = format!("{} {}", problem.field, problem.requirement);
         let kind = ProblemKind::Figure { message };
         let place = scenario.span_of(&format!("social.{}", problem.field));

@@ -192,7 +192,7 @@ fn attribute_error(node: &Node<'_>, attribute: &'static str, expected: &'static 
     }
 }
 
-fn bounds(world: &Node<'_>) -> Result<[f64; 4], ReadError> {
+pub(super) fn bounds(world: &Node<'_>) -> Result<[f64; 4], ReadError> {
     let value = world.value("bounds")?;
     let row = value
         .as_ref()

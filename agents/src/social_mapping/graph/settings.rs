@@ -2,9 +2,11 @@
 //! used changes nothing: those that were in force stay in force until it is mended.
 
 use super::SETTINGS;
+use super::read::bounds;
 use crate::social_mapping::config::SocialConfig;
 use crate::social_mapping::map::SocialMapper;
 use crate::social_mapping::rejection::Rejection;
+use crate::social_mapping::scene::check_size;
 use dsr::{ReadError, Snapshot, Value};
 
 /// The type whose descendants are the classes of objects.
@@ -15,8 +17,8 @@ const OBJECT: &str = "object";
 pub(super) struct Settings {
     text: Option<String>,
     refused: Vec<Rejection>,
-    /// Whether they were refused for names, which the graph may have later.
-    for_names: bool,
+    /// Whether they were refused for names or bounds, which the graph may have otherwise later.
+    for_graph: bool,
 }
 
 impl Settings {
@@ -32,11 +34,11 @@ impl Settings {
         };
         let value = world.value(SETTINGS)?;
         let text = value.as_ref().and_then(Value::as_str);
-        if text == self.text.as_deref() && !self.for_names {
+        if text == self.text.as_deref() && !self.for_graph {
             return Ok(None);
         }
         self.text = text.map(str::to_owned);
-        self.for_names = false;
+        self.for_graph = false;
         let config = match serde_json::from_str::<SocialConfig>(text.unwrap_or("{}")) {
             Ok(config) => config,
             Err(error) => {
@@ -46,14 +48,21 @@ impl Settings {
             }
         };
         let mut problems = config.problems();
+        let mut too_large = None;
         if problems.is_empty() {
             problems = config.unknown_names(&rooms(snapshot)?, classes(snapshot).as_deref());
-            self.for_names = !problems.is_empty();
+            // Bounds that cannot be read are the scene's to complain of.
+            let bounds = bounds(&world).ok();
+            too_large = bounds.and_then(|bounds| check_size(bounds, config.resolution).err());
+            self.for_graph = !problems.is_empty() || too_large.is_some();
         }
-        let told = problems.iter().map(|problem| Rejection::Settings {
-            problem: format!("{} {}", problem.field, problem.requirement),
-        });
-        self.refused = told.collect();
+        let figures = problems
+            .iter()
+            .map(|problem| format!("{} {}", problem.field, problem.requirement));
+        let told = figures.chain(too_large.map(|error| error.to_string()));
+        self.refused = told
+            .map(|problem| Rejection::Settings { problem })
+            .collect();
         Ok(if self.refused.is_empty() {
             SocialMapper::new(config).ok()
         } else {

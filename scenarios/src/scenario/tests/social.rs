@@ -3,9 +3,11 @@
 
 use super::*;
 use crate::scenario::parse_social;
+use agents::grid::shared::SOCIAL_GRID;
 use agents::human_observer::Association;
 use agents::social_mapping::adaptation::WallAdaptation;
 use agents::social_mapping::groups::Method;
+use agents::social_mapping::scene::MOST_CELLS;
 use agents::social_mapping::{AsymmetricGaussian, SocialConfig, UsageCurve};
 use std::collections::BTreeMap;
 
@@ -63,6 +65,31 @@ fn what_social_mapping_cannot_use_is_told_with_its_place() {
     let problems = with("[social]\nresolution = 0\nclearance_cost = -1");
     assert_eq!(problems.len(), 2, "{problems:?}");
     assert!(problems[0].contains("resolution must be from 0.005 m to 10 m"));
+}
+
+#[test]
+fn a_grid_that_is_too_large_is_told_where_bounds_or_resolution_stand() {
+    let text = format!("bounds = [-120, -120, 130, 130]\n{TWO_ROOMS}");
+    let invalid = parse(&text).unwrap_err();
+    assert_eq!(
+        invalid.problems[0].kind.to_string(),
+        "the map's bounds [-120.0, -120.0, 130.0, 130.0] at 0.1 m a cell need 6250000 cells; a grid has at most 4194304"
+    );
+    assert_eq!(invalid.problems[0].line, 1);
+    let text = format!("bounds = [-120, -120, 130, 130]\n{TWO_ROOMS}\n[social]\nresolution = 0.2");
+    let scenario = parse(&text).expect("a good file");
+    let settings = "[social]\nresolution = 0.1\n";
+    let invalid = parse_social("settings.toml", settings, Some(&scenario)).unwrap_err();
+    assert_eq!(invalid.problems[0].line, 2, "{invalid}");
+    assert!(parse_social("settings.toml", settings, None).is_ok());
+}
+
+#[test]
+fn the_vocabulary_has_room_for_the_largest_grid() {
+    let schema = crate::schema().unwrap();
+    let grid = schema.find_attribute(SOCIAL_GRID).unwrap();
+    let room = schema.large_type(grid).unwrap().max_bytes;
+    assert!(4.0 * MOST_CELLS <= room as f64);
 }
 
 #[test]

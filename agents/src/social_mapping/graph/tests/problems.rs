@@ -114,3 +114,52 @@ fn why_there_is_no_map_stands_at_the_world() {
     assert!(centre.turn(&mut agent, noon()).0.grid.is_some());
     assert_eq!(problems(&centre, "world"), "");
 }
+
+#[test]
+fn a_grid_that_is_too_large_is_told_and_the_map_before_goes_on() {
+    let (mut centre, mut agent) = (Centre::new(), agent());
+    let mut now = noon();
+    let mut turn = |centre: &mut Centre| {
+        now = now + 1.0;
+        centre.turn(&mut agent, now).0
+    };
+    assert!(turn(&mut centre).grid.is_some());
+    centre.set("world", SETTINGS, r#"{"resolution": 0.005}"#);
+    let after = turn(&mut centre);
+    assert!(after.stopped.is_none() && after.grid.is_none());
+    assert_eq!(
+        problems(&centre, "world"),
+        "the social settings of the world are not used: the map's bounds [0.0, 0.0, 12.0, 10.0] at 0.005 m a cell need \
+         4800000 cells; a grid has at most 4194304"
+    );
+    centre.place("ana", pose(6.0, 6.0, 0.0));
+    let moved = turn(&mut centre).grid.unwrap();
+    assert!((moved.grid.resolution - 0.1).abs() < 1e-12);
+    // In a smaller world they can be used.
+    centre.set("world", "bounds", [0.0, 0.0, 10.0, 10.0]);
+    let fine = turn(&mut centre).grid.unwrap();
+    assert!((fine.grid.resolution - 0.005).abs() < 1e-12);
+    assert_eq!(problems(&centre, "world"), "");
+    centre.set("world", "bounds", [0.0, 0.0, 250.0, 250.0]);
+    let after = turn(&mut centre);
+    assert!(matches!(
+        after.stopped,
+        Some(StepError::Scene(SceneError::TooLarge { .. }))
+    ));
+    assert!(problems(&centre, "world").contains("need 2500000000 cells"));
+}
+
+#[test]
+fn a_grid_that_there_is_no_room_for_is_told_until_there_is() {
+    let (mut centre, mut agent) = (Centre::new(), agent());
+    centre.turn(&mut agent, noon());
+    agent.given_out(Some(&LargeError::OutOfMemory { bytes: 48000 }));
+    centre.turn(&mut agent, noon() + 1.0);
+    assert_eq!(
+        problems(&centre, "world"),
+        "the new social grid is not given out: no room in /dev/shm for a value of 48000 bytes"
+    );
+    agent.given_out(None);
+    centre.turn(&mut agent, noon() + 2.0);
+    assert_eq!(problems(&centre, "world"), "");
+}
