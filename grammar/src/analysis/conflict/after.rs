@@ -192,7 +192,13 @@ impl<'a, 'c> After<'a, 'c> {
                         // How many there will be, no formula says.
                         return None;
                     }
-                    cases.push(self.some(rest, body, holds, &scope.and_fixed(name, node))?);
+                    let inside = scope.and_fixed(name, node);
+                    let other = self.ways(&inside, |what| match what {
+                        What::Delete(of) | What::Retype(of, _) => Some(vec![(of, node)]),
+                        _ => None,
+                    })?;
+                    let there = self.some(rest, body, holds, &inside)?;
+                    cases.push(all(vec![negated(other), there]));
                 }
                 _ => {}
             }
