@@ -302,12 +302,19 @@ impl SocialMapping {
             Err(StepError::Read(ReadError::Snapshot(error))) => Err(error),
             Err(error) => {
                 let mut turn = Turn::default();
-                let refused = self.settings.refused();
-                problems::write(refused, Some(&error), snapshot, &mut turn.transaction)?;
+                let mut known = read::contents(snapshot, self.mapper.config())?;
+                known.rejected.extend(self.own_problems().cloned());
+                let rejected = self.mapper.problems(&known);
+                problems::write(&rejected, Some(&error), snapshot, &mut turn.transaction)?;
                 turn.stopped = Some(error);
                 Ok(turn)
             }
         }
+    }
+
+    /// What is wrong beside the scene.
+    fn own_problems(&self) -> impl Iterator<Item = &Rejection> {
+        self.settings.refused().iter().chain(&self.withheld)
     }
 
     fn map(&mut self, now: Time, snapshot: &Snapshot) -> Result<Turn, StepError> {
@@ -315,13 +322,7 @@ impl SocialMapping {
             self.mapper = mapper;
         }
         let mut scene = scene(snapshot, self.mapper.config())?;
-        scene.rejected.extend(
-            self.settings
-                .refused()
-                .iter()
-                .chain(&self.withheld)
-                .cloned(),
-        );
+        scene.rejected.extend(self.own_problems().cloned());
         let update = self.mapper.update(now, &scene)?;
         // Reading may fail yet, and the next update would not call the change a change.
         self.unsent = self.unsent.joined(&update.dirty);

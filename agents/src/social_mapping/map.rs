@@ -170,6 +170,18 @@ impl SocialMapper {
         Ok(update)
     }
 
+    /// What an update would leave out or mend of a scene of which no map need be possible.
+    pub fn problems(&self, scene: &SocialScene) -> Vec<Rejection> {
+        let mut rejected = scene.rejected.clone();
+        let people = scene.sound_people(&mut rejected);
+        let objects = scene.sound_objects(&mut rejected);
+        scene.check_uses(&objects, &self.config, &mut rejected);
+        for person in people.iter().filter(|_| scene.social) {
+            self.check_manner(person, &mut rejected);
+        }
+        rejected
+    }
+
     /// A layer of the map as it was last updated; `None` before the first update. Drawn for whoever
     /// asks: the map itself needs no layers.
     pub fn layer(&self, layer: Layer) -> Option<CostGrid> {

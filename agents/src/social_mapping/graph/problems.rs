@@ -29,10 +29,6 @@ pub(super) fn write(
         let lines = no_map.iter().chain(entered.iter().map(|(_, said)| said));
         write_one(&world, &lines.cloned().collect::<Vec<_>>(), transaction)?;
     }
-    if no_map.is_some() {
-        // What else is wrong was not looked at.
-        return Ok(());
-    }
     for type_name in ["activity", "person"] {
         for node in snapshot.nodes_of(type_name) {
             let node = node?;

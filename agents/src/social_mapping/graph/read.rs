@@ -45,14 +45,24 @@ fn vector(node: &Node<'_>, name: &str, absent: f64) -> Result<Vector2<f64>, dsr:
 pub fn scene(snapshot: &Snapshot, config: &SocialConfig) -> Result<SocialScene, ReadError> {
     let world = snapshot.nodes_of("world").next().transpose()?;
     let world = world.ok_or(ReadError::Missing { type_name: "world" })?;
-    let mut scene = SocialScene {
+    Ok(SocialScene {
         bounds: bounds(&world)?,
         walls: walls(&world)?,
         robot_radius: robot_radius(snapshot)?,
-        social: world
-            .value("social")?
-            .and_then(|value| value.as_bool())
-            .unwrap_or(true),
+        ..contents(snapshot, config)?
+    })
+}
+
+/// The scene without what there is no map without: bounds, walls and robot are left out.
+pub(super) fn contents(
+    snapshot: &Snapshot,
+    config: &SocialConfig,
+) -> Result<SocialScene, dsr::ReadError> {
+    let world = snapshot.nodes_of("world").next().transpose()?;
+    let social = world.map(|world| world.value("social")).transpose()?;
+    let social = social.flatten().and_then(|value| value.as_bool());
+    let mut scene = SocialScene {
+        social: social.unwrap_or(true),
         ..SocialScene::default()
     };
     let tasks = tasks(snapshot, config)?;
@@ -230,7 +240,7 @@ fn robot_radius(snapshot: &Snapshot) -> Result<f64, ReadError> {
     largest.ok_or(ReadError::Missing { type_name: "robot" })
 }
 
-fn read_activities(snapshot: &Snapshot, scene: &mut SocialScene) -> Result<(), ReadError> {
+fn read_activities(snapshot: &Snapshot, scene: &mut SocialScene) -> Result<(), dsr::ReadError> {
     let uses = snapshot.schema().find_label("uses");
     for node in snapshot.nodes_of("activity") {
         let node = node?;

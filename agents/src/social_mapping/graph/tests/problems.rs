@@ -110,6 +110,29 @@ fn why_there_is_no_map_stands_at_the_world() {
         problems(&centre, "world"),
         "there is no new map: the robot's radius is NaN m, where it may be from 0 m to 10 m"
     );
+    // All else that is wrong stays told, and what is mended meanwhile goes.
+    let activity = "person ana: there is no activity called `coking`; did you mean `cooking`?";
+    centre.set("ana", "activity", "coking");
+    for (bounds, why) in [
+        (
+            Value::from([0.0; 4]),
+            "the map's bounds [0.0, 0.0, 0.0, 0.0] enclose nothing; need xmin < xmax and ymin < ymax within 1e8 m",
+        ),
+        (
+            Value::from([0.0; 3]),
+            "the attribute bounds of world must be four numbers: xmin, ymin, xmax, ymax",
+        ),
+    ] {
+        centre.set("world", "bounds", bounds);
+        centre.turn(&mut agent, noon());
+        let told = problems(&centre, "world");
+        assert_eq!(told, format!("there is no new map: {why}\n{activity}"));
+        assert_eq!(problems(&centre, "ana"), activity);
+    }
+    centre.set("ana", "activity", "cooking");
+    centre.turn(&mut agent, noon());
+    assert_eq!(problems(&centre, "ana"), "");
+    centre.set("world", "bounds", [0.0, 0.0, 12.0, 10.0]);
     centre.set("robot", "radius", 0.25);
     assert!(centre.turn(&mut agent, noon()).0.grid.is_some());
     assert_eq!(problems(&centre, "world"), "");
