@@ -159,18 +159,29 @@ impl ComfortScene {
         if let Some(index) = broken(&self.walls) {
             return Err(ComfortError::Wall { index });
         }
-        let corners = self.room.len();
-        if let Some(index) = self.room.iter().position(|corner| !is_place(corner)) {
-            return Err(ComfortError::Corner { index });
+        if self.room.is_empty() {
+            return Ok(());
         }
-        if corners > 0 && area(&self.room) < LEAST_AREA {
-            return Err(ComfortError::Room { corners });
-        }
-        if corners > 0 && !is_simple(&self.room) {
-            return Err(ComfortError::Crossed { corners });
-        }
-        Ok(())
+        check_room(&self.room)
     }
+}
+
+/// Whether a closed outline is that of a room.
+///
+/// # Errors
+/// [`ComfortError::Corner`], [`ComfortError::Room`], [`ComfortError::Crossed`].
+pub fn check_room(room: &[Point2<f64>]) -> Result<(), ComfortError> {
+    let corners = room.len();
+    if let Some(index) = room.iter().position(|corner| !is_place(corner)) {
+        return Err(ComfortError::Corner { index });
+    }
+    if area(room) < LEAST_AREA {
+        return Err(ComfortError::Room { corners });
+    }
+    if !is_simple(room) {
+        return Err(ComfortError::Crossed { corners });
+    }
+    Ok(())
 }
 
 /// A room smaller than this is none, m^2: corners in one line enclose as much by rounding.

@@ -143,6 +143,14 @@ pub enum Rejection {
         /// Its class.
         class: String,
     },
+    /// Nobody is inside or outside of such a room.
+    #[error("the polygon of {room} is no room's: {problem}")]
+    Polygon {
+        /// The room.
+        room: String,
+        /// What is wrong.
+        problem: String,
+    },
     /// What is usually done in the room has no effect.
     #[error("`activity_in` has no effect: there is no room called `{room}`")]
     Room {
@@ -194,7 +202,10 @@ impl Rejection {
                 UsedBy::Activity(name) => Entered::Activity(name),
                 UsedBy::Settings => Entered::World,
             }),
-            Self::Settings { .. } | Self::Grid { .. } | Self::Room { .. } => Some(Entered::World),
+            Self::Settings { .. }
+            | Self::Grid { .. }
+            | Self::Room { .. }
+            | Self::Polygon { .. } => Some(Entered::World),
             Self::PersonPose { .. }
             | Self::PersonVelocity { .. }
             | Self::PersonRadius { .. }

@@ -2,6 +2,7 @@
 //! stands in for those that are absent.
 
 use super::ReadError;
+use crate::social_mapping::comfort::check_room;
 use crate::social_mapping::config::SocialConfig;
 use crate::social_mapping::features::Features;
 use crate::social_mapping::object_space::Outline;
@@ -115,6 +116,7 @@ pub(super) fn contents(
         }
     }
     read_activities(snapshot, &mut scene)?;
+    check_rooms(snapshot, &mut scene.rejected)?;
     Ok(scene)
 }
 
@@ -238,6 +240,28 @@ fn robot_radius(snapshot: &Snapshot) -> Result<f64, ReadError> {
         largest = Some(largest.map_or(radius, |known| if radius < known { known } else { radius }));
     }
     largest.ok_or(ReadError::Missing { type_name: "robot" })
+}
+
+/// Reports the rooms whose outline is none.
+fn check_rooms(snapshot: &Snapshot, rejected: &mut Vec<Rejection>) -> Result<(), dsr::ReadError> {
+    for node in snapshot.nodes_of("room") {
+        let node = node?;
+        let Some(value) = node.value("polygon")? else {
+            continue;
+        };
+        let problem = match value.as_f64s().map(<[f64]>::as_chunks::<2>) {
+            Some((corners, [])) => {
+                let corners: Vec<_> = corners.iter().map(|&[x, y]| Point2::new(x, y)).collect();
+                check_room(&corners).err().map(|error| error.to_string())
+            }
+            _ => Some("it needs two numbers, x and y, for each corner".to_owned()),
+        };
+        if let Some(problem) = problem {
+            let room = node.name()?;
+            rejected.push(Rejection::Polygon { room, problem });
+        }
+    }
+    Ok(())
 }
 
 fn read_activities(snapshot: &Snapshot, scene: &mut SocialScene) -> Result<(), dsr::ReadError> {

@@ -60,6 +60,7 @@ binding = { kind = "string" }
 cancelled = { kind = "bool" }
 social_settings = { kind = "string" }
 problems = { kind = "string" }
+polygon = { kind = "f64_list" }
 "#;
 
 fn noon() -> Time {

@@ -186,3 +186,39 @@ fn a_grid_that_there_is_no_room_for_is_told_until_there_is() {
     centre.turn(&mut agent, noon() + 2.0);
     assert_eq!(problems(&centre, "world"), "");
 }
+
+#[test]
+fn a_room_whose_outline_is_none_is_told_at_the_world() {
+    let (mut centre, mut agent) = (Centre::new(), agent());
+    centre.add("room", "kitchen", None, &[]);
+    let mut now = noon();
+    let mut told = |centre: &mut Centre, polygon: &[f64]| {
+        now = now + 1.0;
+        centre.set("kitchen", "polygon", Value::F64List(polygon.to_vec()));
+        centre.turn(&mut agent, now);
+        problems(centre, "world")
+    };
+    let none = |why: &str| format!("the polygon of kitchen is no room's: {why}");
+    for (polygon, why) in [
+        (&[][..], "the room of 0 corners encloses nothing"),
+        (
+            &[0.0, 0.0, 1.0, 1.0, 2.0, 2.0],
+            "the room of 3 corners encloses nothing",
+        ),
+        (
+            &[0.0, 0.0, 2.0, 2.0, 2.0, 0.0, 0.0, 1.0],
+            "the outline of the room, of 4 corners, crosses itself",
+        ),
+        (
+            &[0.0, 0.0, 1.0, 0.0, 1.0],
+            "it needs two numbers, x and y, for each corner",
+        ),
+        (
+            &[0.0, 0.0, 1.0, 0.0, f64::NAN, 1.0],
+            "corner 2 of the room is no place within 1e8 m",
+        ),
+    ] {
+        assert_eq!(told(&mut centre, polygon), none(why));
+    }
+    assert_eq!(told(&mut centre, &[0.0, 0.0, 1.0, 0.0, 1.0, 1.0]), "");
+}
