@@ -120,6 +120,12 @@ pub enum FeatureError {
         /// The nearest name, or all.
         help: String,
     },
+    /// Given more than once.
+    #[error("{feature} is given twice")]
+    Twice {
+        /// The feature.
+        feature: String,
+    },
     /// Neither a level's name nor a number in (0, 1].
     #[error(
         "`{value}` is no value of {feature}, which is a number above 0 and at most 1 or the name of a level{help}"
@@ -186,7 +192,11 @@ impl Features {
                 value: value.to_owned(),
                 help: suggestion(value, feature.levels.keys().map(String::as_str)),
             })?;
-            values.insert(name.to_owned(), number);
+            if values.insert(name.to_owned(), number).is_some() {
+                return Err(FeatureError::Twice {
+                    feature: name.to_owned(),
+                });
+            }
         }
         Ok(values)
     }
@@ -319,6 +329,10 @@ mod tests {
     fn what_cannot_be_read_says_what_could() {
         let refused = |text: &str| Features::default().parse(text).unwrap_err().to_string();
         assert_eq!(refused("happy"), "`happy` is not feature=value");
+        assert_eq!(
+            refused("emotional_state=happy, role=staff, emotional_state=sad"),
+            "emotional_state is given twice"
+        );
         assert_eq!(
             refused("mood=happy"),
             "there is no feature called `mood`; known are: beverage_need, emotional_state, food_need, role"
