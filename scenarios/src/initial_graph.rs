@@ -3,7 +3,7 @@
 
 use crate::scenario::{Activity, Door, Scenario};
 use agents::human_observer::SETTINGS as OBSERVER_SETTINGS;
-use agents::social_mapping::graph::SETTINGS;
+use agents::social_mapping::graph::{SCENARIO_SETTINGS, SETTINGS};
 use dsr::{EdgeRef, Operation, Schema, SchemaFileError, Transaction, Value};
 use nalgebra::{Isometry2, Point2};
 
@@ -36,6 +36,7 @@ pub fn initial_graph(scenario: &Scenario) -> Transaction {
     // Figures that JSON cannot have are in no scenario.
     if let Ok(settings) = serde_json::to_string(&scenario.social) {
         world.push(attribute(SETTINGS, settings.as_str()));
+        world.push(attribute(SCENARIO_SETTINGS, settings.as_str()));
     }
     if let Ok(settings) = serde_json::to_string(&scenario.human_observer) {
         world.push(attribute(OBSERVER_SETTINGS, settings.as_str()));

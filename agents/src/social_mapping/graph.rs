@@ -38,8 +38,11 @@ pub const SPACE: &str = "space";
 /// The attribute that holds R(t).
 pub const USAGE: &str = "usage";
 /// The world's attribute that holds the figures of the social map, as JSON: those of
-/// [`SocialConfig`], of which any may be missing. It may be set while running.
+/// [`SocialConfig`], of which any may be missing: the scenario's hold for those. It may be set while running.
 pub const SETTINGS: &str = "social_settings";
+/// The world's attribute that holds the figures of the scenario, as JSON like [`SETTINGS`]: those that count for each key
+/// that `SETTINGS` does not give.
+pub const SCENARIO_SETTINGS: &str = "social_scenario_settings";
 
 /// A polyline is written again when its person moved further than this, metres ...
 const MOVED: f64 = 0.05;

@@ -1,13 +1,14 @@
 //! The settings that somebody enters at the world while the system runs. This file guarantees that what cannot be
 //! used changes nothing: those that were in force stay in force until it is mended.
 
-use super::SETTINGS;
 use super::read::bounds;
+use super::{SCENARIO_SETTINGS, SETTINGS};
 use crate::social_mapping::config::SocialConfig;
 use crate::social_mapping::map::SocialMapper;
 use crate::social_mapping::rejection::Rejection;
 use crate::social_mapping::scene::check_size;
-use dsr::{ReadError, Snapshot, Value};
+use dsr::{Node, ReadError, Snapshot, Value};
+use serde_json::Map;
 
 /// The type whose descendants are the classes of objects.
 const OBJECT: &str = "object";
@@ -15,10 +16,43 @@ const OBJECT: &str = "object";
 /// What was read last.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Settings {
-    text: Option<String>,
+    given: Given,
     refused: Vec<Rejection>,
     /// Whether they were refused for names or bounds, which the graph may have otherwise later.
     for_graph: bool,
+}
+
+/// What stands at the world.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+struct Given {
+    scenario: Option<String>,
+    settings: Option<String>,
+}
+
+impl Given {
+    fn read(world: &Node<'_>) -> Result<Self, ReadError> {
+        let text = |name| -> Result<Option<String>, ReadError> {
+            let value = world.value(name)?;
+            Ok(value.as_ref().and_then(Value::as_str).map(str::to_owned))
+        };
+        Ok(Self {
+            scenario: text(SCENARIO_SETTINGS)?,
+            settings: text(SETTINGS)?,
+        })
+    }
+
+    /// The settings laid over the scenario's, key by key.
+    fn config(&self) -> Result<SocialConfig, serde_json::Error> {
+        let fields = |text: &Option<String>| -> Result<Map<String, _>, serde_json::Error> {
+            let text = text.as_deref().unwrap_or("{}");
+            // By themselves first: then what is wrong is told with its place in the text.
+            serde_json::from_str::<SocialConfig>(text)?;
+            serde_json::from_str(text)
+        };
+        let mut all = fields(&self.scenario)?;
+        all.extend(fields(&self.settings)?);
+        serde_json::from_value(serde_json::Value::Object(all))
+    }
 }
 
 impl Settings {
@@ -32,14 +66,13 @@ impl Settings {
         let Some(world) = snapshot.nodes_of("world").next().transpose()? else {
             return Ok(None);
         };
-        let value = world.value(SETTINGS)?;
-        let text = value.as_ref().and_then(Value::as_str);
-        if text == self.text.as_deref() && !self.for_graph {
+        let given = Given::read(&world)?;
+        if given == self.given && !self.for_graph {
             return Ok(None);
         }
-        self.text = text.map(str::to_owned);
+        self.given = given;
         self.for_graph = false;
-        let config = match serde_json::from_str::<SocialConfig>(text.unwrap_or("{}")) {
+        let config = match self.given.config() {
             Ok(config) => config,
             Err(error) => {
                 let problem = error.to_string();

@@ -59,6 +59,7 @@ rule = { kind = "string" }
 binding = { kind = "string" }
 cancelled = { kind = "bool" }
 social_settings = { kind = "string" }
+social_scenario_settings = { kind = "string" }
 problems = { kind = "string" }
 polygon = { kind = "f64_list" }
 "#;

@@ -222,3 +222,32 @@ fn a_room_whose_outline_is_none_is_told_at_the_world() {
     }
     assert_eq!(told(&mut centre, &[0.0, 0.0, 1.0, 0.0, 1.0, 1.0]), "");
 }
+
+#[test]
+fn settings_are_laid_over_those_of_the_scenario() {
+    let (mut centre, mut agent) = (Centre::new(), agent());
+    let mut now = noon();
+    let mut turn = |centre: &mut Centre| {
+        now = now + 1.0;
+        centre.turn(&mut agent, now);
+        assert_eq!(problems(centre, "world"), "");
+        centre.value("ana", "personal_zone")
+    };
+    centre.add("room", "kitchen", None, &[]);
+    let mut enter = Transaction::new();
+    enter.create_edge("ana", "in", "kitchen");
+    centre.commit(&enter);
+    let plain = turn(&mut centre);
+    let scenario = r#"{"activity_in": {"kitchen": "running"}, "resolution": 0.2}"#;
+    centre.set("world", SCENARIO_SETTINGS, scenario);
+    centre.set("world", SETTINGS, scenario);
+    let running = turn(&mut centre);
+    assert_ne!(running, plain);
+    // What is not given stays as the scenario has it, and without any all is.
+    centre.set("world", SETTINGS, r#"{"clearance_cost": 0.3}"#);
+    assert_eq!(turn(&mut centre), running);
+    centre.set("world", SETTINGS, r#"{"activity_in": {}}"#);
+    assert_eq!(turn(&mut centre), plain);
+    centre.set("world", SETTINGS, "{}");
+    assert_eq!(turn(&mut centre), running);
+}
