@@ -144,6 +144,20 @@ fn a_situation_is_drawn_and_written_as_a_map() {
         assert!(text.contains("t = 1: people 3, groups 1"), "{text}");
         assert!(fs::read(out(name)).unwrap().starts_with(magic), "{name}");
     }
+    let (_, text, _) = cortex(&[
+        "social",
+        "map",
+        &file,
+        "--at=-1",
+        "--out",
+        &out("first.svg"),
+    ]);
+    assert!(
+        text.contains("the recording starts at ") && text.contains(": this is its first frame"),
+        "{text}"
+    );
+    let (_, text, _) = cortex(&["social", "map", &file, "--out", &out("first.svg")]);
+    assert!(!text.contains("the recording starts"), "{text}");
     let svg = fs::read_to_string(out("density.svg")).unwrap();
     for words in [
         "group 1",

@@ -138,7 +138,14 @@ fn situation(arguments: &Arguments) -> Result<(Situation, SocialConfig, Vec<Stri
     // How far the picture goes is decided by them.
     let config = with_flags(settings.unwrap_or_default(), arguments);
     let situation = Situation::of_frame(&name, frame, &config);
-    Ok((situation, config, Vec::new()))
+    let mut notes = Vec::new();
+    if arguments.at.is_some() && time < frame.time {
+        let start = frame.time;
+        notes.push(format!(
+            "the recording starts at {start}: this is its first frame"
+        ));
+    }
+    Ok((situation, config, notes))
 }
 
 /// What a scenario's schedules do not tell of a time.
