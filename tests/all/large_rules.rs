@@ -181,3 +181,29 @@ fn matches_without_end_are_listed_and_counted_in_part() {
         "{out}"
     );
 }
+
+#[test]
+fn conditions_nested_deeply_leave_conflicts_undecided() {
+    // Each quantifier ranges over a dozen nodes: what is tried would be twelve to the fortieth.
+    let depth = 40;
+    let each = |count: usize, word: &str| -> String {
+        let words: Vec<String> = (0..count)
+            .map(|n| word.replace('#', &n.to_string()))
+            .collect();
+        words.concat()
+    };
+    let (nodes, nested) = (each(12, "x#:A "), each(depth, "(forall z#:A "));
+    let last = depth - 1;
+    let close = ")".repeat(depth);
+    let rule = format!(
+        "name=deep\n===\nr : active(1) {{ {{ {nodes} }} => {{ x0:A }} precondition {{ {nested} (p x0 z{last}) {close} }} }}\n"
+    );
+    let folder = folder(&[("rules.aggl", &rule)]);
+    let (code, out, told) = cortex(&folder, &["rules", "check", "rules.aggl", "--json"]);
+    assert_eq!(code, 0, "{told}");
+    let out: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(
+        (&out["conflicts"], &out["conflicts_left"]),
+        (&json!([]), &json!(1))
+    );
+}

@@ -12,6 +12,8 @@ use std::rc::Rc;
 const WAYS: usize = 16;
 /// How many formulas are looked at for one graph, each as often as there are ways to come to it.
 const FORMULAS: usize = 500;
+/// How many parts of formulas are held against a draft for one graph; what is asked after that is not known.
+const PARTS: usize = 20_000;
 
 /// How much of a draft is taken as it is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,6 +33,8 @@ pub(super) struct Ways<'t> {
     fragile: bool,
     /// So many formulas are still looked at.
     left: Cell<usize>,
+    /// So many parts are still held against drafts.
+    parts: Cell<usize>,
 }
 
 impl<'t> Ways<'t> {
@@ -39,12 +43,14 @@ impl<'t> Ways<'t> {
             types,
             fragile,
             left: Cell::new(FORMULAS),
+            parts: Cell::new(PARTS),
         }
     }
 
-    /// How many formulas were looked at until now.
+    /// How many formulas were looked at until now, those that were held against drafts counted by their parts.
     pub(super) fn looked_at(&self) -> u64 {
-        (FORMULAS - self.left.get()) as u64
+        let parts = (PARTS - self.parts.get()) / (PARTS / FORMULAS);
+        (FORMULAS - self.left.get() + parts) as u64
     }
 
     /// Ways to make a condition come out as `holds`, the smallest first.
@@ -250,6 +256,7 @@ impl<'t> Ways<'t> {
         condition: &Condition,
         drawn: Drawn,
     ) -> Option<bool> {
+        self.parts.set(self.parts.get().checked_sub(1)?);
         let known = |condition| self.known(draft, places, condition, drawn);
         let are_all = drawn != Drawn::Parts;
         match condition {
