@@ -141,9 +141,11 @@ impl Grouping {
             let count = poses.len();
             return Err(TooCrowded::Pairs { count, pairs });
         }
-        let most = Near::new(&places, SPOT).most();
-        if self.method == Method::Facing && most > MOST_ON_A_SPOT {
-            return Err(TooCrowded::Spot { most });
+        if self.method == Method::Facing {
+            let most = Near::new(&places, SPOT).most();
+            if most > MOST_ON_A_SPOT {
+                return Err(TooCrowded::Spot { most });
+            }
         }
         let mut groups = match self.method {
             Method::Facing => self.facing.groups(&poses),
