@@ -108,14 +108,18 @@ fn rules_are_not_measured_without_their_peers() {
     let folder = TempDir::new_in(program.parent().unwrap()).unwrap();
     let alone = folder.path().join("cortex");
     fs::hard_link(program, &alone).unwrap();
-    let output = std::process::Command::new(&alone)
-        .args(["bench", "rules", "--json"])
-        .env("PATH", folder.path())
-        .output()
-        .unwrap();
-    let told = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{told}");
-    assert!(output.stdout.is_empty());
+    let refused = || {
+        let output = std::process::Command::new(&alone)
+            .args(["bench", "rules", "--json"])
+            .env("PATH", folder.path())
+            .output()
+            .unwrap();
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{told}");
+        assert!(output.stdout.is_empty());
+        told
+    };
+    let told = refused();
     for words in [
         "cortex-peers",
         "cargo cannot be started",
@@ -130,13 +134,7 @@ fn rules_are_not_measured_without_their_peers() {
     let script = format!("#!/bin/sh\necho \"$@\" > '{}'\nexit 101\n", asked.display());
     fs::write(&cargo, script).unwrap();
     fs::set_permissions(&cargo, fs::Permissions::from_mode(0o755)).unwrap();
-    let output = std::process::Command::new(&alone)
-        .args(["bench", "rules", "--json"])
-        .env("PATH", folder.path())
-        .output()
-        .unwrap();
-    let told = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{told}");
+    let told = refused();
     assert!(told.contains("cargo ended with"), "{told}");
     let asked = fs::read_to_string(asked).unwrap();
     assert!(
