@@ -90,6 +90,12 @@ pub enum Problem {
         /// The rule.
         rule: String,
     },
+    /// A clause or modifier that only a rule can have, at a combo.
+    #[error("a combo has no `{word}`, but the rules that are its steps may")]
+    NotOfCombo {
+        /// The word.
+        word: String,
+    },
     /// A number outside of what is allowed.
     #[error("{what} must be {range}, not {found}")]
     OutOfRange {
@@ -138,9 +144,13 @@ pub enum Problem {
         /// What was probably meant.
         suggestion: Option<String>,
     },
-    /// A type that none of the files that could be read declares; one that is missing may.
-    #[error("no type `{name}` in the files that could be read: one that is missing may declare it")]
-    TypeNotRead {
+    /// A type or rule that none of the files that could be read has; one that is missing may.
+    #[error(
+        "no {what} `{name}` in the files that could be read: one that is missing may declare it"
+    )]
+    NotRead {
+        /// Kind of thing: type, rule.
+        what: &'static str,
         /// As written.
         name: String,
         /// What was probably meant.
@@ -254,6 +264,18 @@ pub enum Problem {
         /// The link, as in a graph.
         link: String,
     },
+    /// An attribute is assigned to a link that the rule takes away.
+    #[error("this rule takes away the link `{link}`, so that nothing is assigned to it")]
+    LinkTaken {
+        /// The link, as in a graph.
+        link: String,
+    },
+    /// A cost or duration that is no number of 0 or more at any match.
+    #[error("this is a number of 0 or more at no match of the rule: {reason}")]
+    NeverAmount {
+        /// Why.
+        reason: String,
+    },
     /// A combo of which the steps are a rule only without optional ones.
     #[error("this combo is never applied with all its steps: {reason}")]
     NeverWhole {
@@ -321,11 +343,13 @@ impl Problem {
     pub fn severity(&self) -> Severity {
         match self {
             Self::Incompatible { .. }
-            | Self::TypeNotRead { .. }
+            | Self::NotRead { .. }
             | Self::UndeclaredParent { .. }
             | Self::NotUnfolded { .. }
             | Self::NeverWhole { .. }
             | Self::MaybeNoLink { .. }
+            | Self::LinkTaken { .. }
+            | Self::NeverAmount { .. }
             | Self::NeverMatches { .. }
             | Self::UnusedVariable { .. }
             | Self::BeyondManifest { .. }
@@ -341,7 +365,7 @@ impl Problem {
             Self::Expected { suggestion, .. }
             | Self::UnknownVariable { suggestion, .. }
             | Self::UnknownType { suggestion, .. }
-            | Self::TypeNotRead { suggestion, .. }
+            | Self::NotRead { suggestion, .. }
             | Self::NotInSchema { suggestion, .. }
             | Self::UnknownName { suggestion, .. } => suggestion
                 .as_ref()

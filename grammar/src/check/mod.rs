@@ -17,8 +17,8 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Checks the rules and combos against each other and the types.
 ///
 /// `broken` are rules that are there but have errors in them already: what could be read of them
-/// is checked, too. If files are `missing`, names may be declared there: of types that is said,
-/// each once, and others are not complained of.
+/// is checked, too. If files are `missing`, types and rules may be declared there: that is said, of each
+/// name once.
 pub(crate) fn check_grammar(grammar: &Grammar, broken: &[Broken], missing: bool) -> Vec<Finding> {
     let mut check = Check {
         types: &grammar.types,
@@ -84,8 +84,8 @@ struct Check<'a> {
     missing: bool,
     /// Of all rules and combos, broken ones included.
     rules: Vec<Name>,
-    /// Types that were told to be in no file that could be read, each once.
-    not_read: BTreeSet<Name>,
+    /// What was told to be in no file that could be read, each name once.
+    not_read: BTreeSet<(&'static str, Name)>,
     findings: Vec<Finding>,
 }
 
@@ -161,24 +161,30 @@ impl Check<'_> {
         if self.types.is_empty() || self.types.contains(name) {
             return;
         }
-        if self.missing && !self.not_read.insert(name.clone()) {
-            return;
-        }
         let known = self.types.names().chain(self.types.undeclared());
         let suggestion = suggest(name, known.map(Name::as_str));
+        if self.missing {
+            return self.not_read("type", name, suggestion);
+        }
         let text = name.to_string();
-        let problem = if self.missing {
-            Problem::TypeNotRead {
-                name: text,
-                suggestion,
-            }
-        } else {
-            Problem::UnknownType {
-                name: text,
-                suggestion,
-            }
+        let problem = Problem::UnknownType {
+            name: text,
+            suggestion,
         };
         self.report(name, problem);
+    }
+
+    /// A name that a missing file may declare; told once.
+    fn not_read(&mut self, what: &'static str, name: &Name, suggestion: Option<String>) {
+        if self.not_read.insert((what, name.clone())) {
+            let text = name.to_string();
+            let problem = Problem::NotRead {
+                what,
+                name: text,
+                suggestion,
+            };
+            self.report(name, problem);
+        }
     }
 
     fn distinct_rules(&mut self) {
@@ -198,10 +204,13 @@ impl Check<'_> {
     }
 
     fn rule_name(&mut self, name: &Name) {
-        if self.missing || self.rules.contains(name) {
+        if self.rules.contains(name) {
             return;
         }
         let suggestion = suggest(name, self.rules.iter().map(Name::as_str));
+        if self.missing {
+            return self.not_read("rule", name, suggestion);
+        }
         let name_text = name.to_string();
         self.report(
             name,

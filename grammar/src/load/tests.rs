@@ -6,6 +6,8 @@ use crate::testing::{CARE, read};
 use crate::{Condition, Effect, Expression, Kind, Literal};
 use expect_test::{Expect, expect};
 
+mod recovery;
+
 /// What is reported about a grammar, one line each.
 fn check(text: &str, expected: &Expect) {
     let (_, diagnostics) = parse_grammar(text, "f.aggl");
@@ -328,6 +330,7 @@ fn included_files_are_read_once_and_missing_ones_are_told() {
     // `nothere` may be declared in the missing file.
     expect![[r#"
         main.aggl:4:9: error: cannot read the included file `gone.aggl`: no such file
+        main.aggl:6:24: warning: no rule `nothere` in the files that could be read: one that is missing may declare it
         base.aggl:4:23: error: no variable `y` on the left side (did you mean `x`?)"#]]
     .assert_eq(&Defects { diagnostics }.to_string());
     assert!(

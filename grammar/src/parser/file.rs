@@ -7,6 +7,8 @@ use super::{Finding, NodeNames, Parser};
 use crate::lexer::TokenKind;
 use crate::sound::{Part, Region};
 use crate::{Combo, Include, Name, Problem, Property, Rule, Span, TypeDeclaration, Types};
+use dsr::suggest;
+use std::ops::Range;
 
 /// A grammar file by itself, its includes not followed.
 #[derive(Debug, Default)]
@@ -115,7 +117,7 @@ impl Parser<'_> {
             let Some(token) = self.peek().cloned() else {
                 break;
             };
-            if self.is_keyword(self.at, "include", "(") {
+            if self.is_keyword(self.at, "include", "(") || self.at_bare_include() {
                 parsed
                     .regions
                     .push(self.region(token.range.start, Part::Include));
@@ -192,6 +194,9 @@ impl Parser<'_> {
     }
 
     fn include(&mut self) -> Option<Name> {
+        if self.at_bare_include() {
+            return self.bare_include();
+        }
         let is_misspelt = !self.is_word("include");
         self.keyword("include");
         let opening = self.bump();
@@ -212,6 +217,47 @@ impl Parser<'_> {
         let name = Name::new(path, self.span(start..start + path.len()));
         self.expect(")", "`)` after the path")?;
         Some(name)
+    }
+
+    /// Whether a line such as `include path` begins here, without the brackets, misspelt or not.
+    fn at_bare_include(&self) -> bool {
+        let word = self.token_text(self.at);
+        let rest = self.rest_of_line();
+        let path = &self.text[rest];
+        self.is_word_at(self.at)
+            && self.tokens[self.at].first_on_line
+            && (word == "include" || suggest(word, ["include"]).is_some())
+            && !path.is_empty()
+            && !path.contains([':', '(', '{'])
+    }
+
+    /// What follows the current token on its line, but for blanks and a comment.
+    fn rest_of_line(&self) -> Range<usize> {
+        let start = self.tokens[self.at].range.end;
+        let line = self.text[start..].lines().next().unwrap_or_default();
+        let words = line.split('#').next().unwrap_or_default();
+        let first = start + (words.len() - words.trim_start().len());
+        first..first + words.trim().len()
+    }
+
+    fn bare_include(&mut self) -> Option<Name> {
+        let rest = self.rest_of_line();
+        let keyword = self.bump();
+        while self
+            .peek()
+            .is_some_and(|token| token.range.start < rest.end)
+        {
+            self.bump();
+        }
+        let is_bracket = |c: char| matches!(c, '"' | '\'' | '<' | '>' | ')');
+        let path = self.text[rest.clone()].trim_matches(is_bracket);
+        let problem = Problem::Expected {
+            expected: "`include(path)`".to_owned(),
+            found: format!("`{}`", &self.text[keyword.start..rest.end]),
+            suggestion: Some(format!("include({path})")),
+        };
+        self.report(keyword.start..rest.end, problem);
+        (!path.is_empty()).then(|| Name::new(path, self.span(rest)))
     }
 
     /// The path from a place to the bracket on its line, which the lexer did not know to be one.

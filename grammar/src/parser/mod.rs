@@ -3,6 +3,7 @@
 //! Guarantee: a broken rule never hides the next one, or an include. The beginning of each is found before
 //! anything is parsed, and no rule reads past the next beginning.
 
+mod combo;
 mod file;
 mod form;
 mod formula;
@@ -229,6 +230,26 @@ impl<'a> Parser<'a> {
             && self.token_text(self.at) == word
     }
 
+    fn is_word_at(&self, at: usize) -> bool {
+        self.tokens[..self.limit]
+            .get(at)
+            .is_some_and(|token| token.kind == TokenKind::Word)
+    }
+
+    /// Which of the keywords the current token is. One that is misspelt is told of and taken for what it was meant
+    /// to be.
+    fn keyword_among(&mut self, keywords: &[&'static str], expected: &str) -> Option<&'static str> {
+        let word = self.token_text(self.at);
+        let known = |word: &str| keywords.iter().find(|&&known| known == word).copied();
+        known(word).or_else(|| {
+            self.expected(expected, keywords);
+            let meant = self
+                .is_word_at(self.at)
+                .then(|| suggest(word, keywords.iter().copied()));
+            known(&meant??)
+        })
+    }
+
     fn bump(&mut self) -> Range<usize> {
         let range = self.peek().map_or(0..0, |token| token.range.clone());
         self.at = (self.at + 1).min(self.limit);
@@ -382,11 +403,19 @@ impl<'a> Parser<'a> {
         while rule::MODIFIERS.contains(&self.token_text(at)) && word(at + 1) {
             at += 1;
         }
-        word(at)
-            && self.is_symbol_at(at + 1, ":")
-            && matches!(self.token_text(at + 2), "active" | "passive")
-            && (self.is_symbol_at(at + 3, "{")
-                || (self.is_symbol_at(at + 3, "(") && !self.is_symbol_at(at + 5, ",")))
+        if !word(at) || !self.is_symbol_at(at + 1, ":") {
+            return false;
+        }
+        let kind = self.token_text(at + 2);
+        if matches!(kind, "active" | "passive") {
+            return self.is_symbol_at(at + 3, "{")
+                || (self.is_symbol_at(at + 3, "(") && !self.is_symbol_at(at + 5, ","));
+        }
+        // A node's place in a drawing is two numbers, so that one can only be a cost.
+        let cost = self.is_symbol_at(at + 3, "(")
+            && self.is_symbol_at(at + 5, ")")
+            && self.tokens[at + 4].kind == TokenKind::Number;
+        cost && suggest(kind, rule::KINDS).is_some()
     }
 
     fn begins_include(&self, at: usize) -> bool {

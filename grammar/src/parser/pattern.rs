@@ -3,7 +3,6 @@
 //! Guarantee: a broken line of a graph is reported and the other lines are still read.
 
 use super::Parser;
-use crate::lexer::TokenKind;
 use crate::{Name, Pattern, PatternEdge, PatternNode};
 
 /// Blocks that may follow the graphs of a rule or goal.
@@ -33,12 +32,10 @@ impl Parser<'_> {
         Some(pattern)
     }
 
-    /// Whether a block such as `precondition {` begins here.
+    /// Whether a block such as `precondition {` begins here, misspelt or not.
     pub(super) fn at_section(&self) -> bool {
-        self.peek()
-            .is_some_and(|token| token.kind == TokenKind::Word)
-            && SECTIONS.contains(&self.token_text(self.at))
-            && self.is_symbol_at(self.at + 1, "{")
+        let mut keywords = SECTIONS.iter();
+        self.peek().is_some() && keywords.any(|keyword| self.is_keyword(self.at, keyword, "{"))
     }
 
     fn graph_item(&mut self, pattern: &mut Pattern) -> Option<()> {

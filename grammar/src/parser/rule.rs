@@ -1,14 +1,11 @@
-//! Rules and combo rules.
+//! Rules: header, graphs, blocks.
 //!
 //! Guarantee: what is returned was read without an error that changes its meaning.
 
 use super::Parser;
 use super::pattern::SECTIONS;
 use crate::lexer::TokenKind;
-use crate::{
-    Combo, ComboStep, ComboVariable, Effect, Expression, Kind, Literal, Name, Pattern, PatternNode,
-    Problem, Rule,
-};
+use crate::{Combo, Effect, Expression, Kind, Literal, Name, Pattern, PatternNode, Problem, Rule};
 use std::ops::Range;
 
 /// Which whole numbers a value can be.
@@ -17,6 +14,7 @@ const WHOLE: &str =
 
 /// Words that may stand before a rule's name.
 pub(super) const MODIFIERS: [&str; 3] = ["dormant", "hierarchical", "strict"];
+pub(super) const KINDS: [&str; 2] = ["active", "passive"];
 /// Words that may stand between a rule's cost and its body.
 const CLAUSES: [&str; 5] = ["success", "activates", "cost", "duration", "agent"];
 
@@ -38,16 +36,18 @@ pub(crate) struct Broken {
 }
 
 #[derive(Debug)]
-struct Header {
-    name: Name,
-    kind: Kind,
-    constant_cost: Expression,
+pub(super) struct Header {
+    pub(super) name: Name,
+    pub(super) kind: Kind,
+    pub(super) constant_cost: Expression,
     cost: Option<Expression>,
     duration: Option<Expression>,
     agent: Option<Name>,
     success: Option<f64>,
-    modifiers: Vec<Name>,
     activates: Option<Vec<Name>>,
+    pub(super) modifiers: Vec<Name>,
+    /// The words of the clauses.
+    pub(super) clauses: Vec<Name>,
 }
 
 impl Header {
@@ -60,8 +60,9 @@ impl Header {
             duration: None,
             agent: None,
             success: None,
-            modifiers: Vec::new(),
             activates: None,
+            modifiers: Vec::new(),
+            clauses: Vec::new(),
         }
     }
 }
@@ -117,21 +118,7 @@ impl Parser<'_> {
     }
 
     fn header(&mut self, header: &mut Header) -> Option<()> {
-        while MODIFIERS.contains(&self.token_text(self.at)) && !self.is_symbol_at(self.at + 1, ":")
-        {
-            let modifier = self.bump_name();
-            if header.modifiers.contains(&modifier) {
-                let span = modifier.span();
-                self.repeated(span.start..span.end, format!("`{modifier}`"));
-            }
-            header.modifiers.push(modifier);
-        }
-        let after = self.tokens[..self.limit].get(self.at + 1);
-        if after.is_some_and(|token| token.kind == TokenKind::Word) {
-            let expected = "`dormant`, `hierarchical`, `strict` or a rule's name";
-            self.expected(expected, &MODIFIERS);
-            return None;
-        }
+        self.modifiers(header)?;
         header.name = self.name("a rule's name")?;
         self.expect(":", "`:` after the rule's name")?;
         while MODIFIERS.contains(&self.token_text(self.at)) {
@@ -140,26 +127,47 @@ impl Parser<'_> {
             let rule = header.name.to_string();
             self.report(range, Problem::Misplaced { word, rule });
         }
-        match self.token_text(self.at) {
-            "active" => header.kind = Kind::Active,
-            "passive" => header.kind = Kind::Passive,
-            _ => {
-                self.expected("`active` or `passive`", &["active", "passive"]);
-                return None;
-            }
-        }
+        header.kind = match self.keyword_among(&KINDS, "`active` or `passive`") {
+            Some("passive") => Kind::Passive,
+            None if !self.is_symbol_at(self.at + 1, "(") => return None,
+            _ => Kind::Active,
+        };
         self.bump();
+        let cost = self.at;
         if self.constant_cost(header).is_none() {
-            self.skip_clause();
+            self.skip_clause(cost);
         }
         while !self.is_symbol("{") {
             if self.peek().is_none() {
                 self.expected("`{` and the rule's body", &[]);
                 return None;
             }
+            let clause = self.at;
             if self.clause(header).is_none() {
-                self.skip_clause();
+                self.skip_clause(clause);
             }
+        }
+        Some(())
+    }
+
+    /// The words before a rule's name.
+    fn modifiers(&mut self, header: &mut Header) -> Option<()> {
+        while self.is_word_at(self.at + 1) || self.is_digits(self.at + 1) {
+            let expected = "`dormant`, `hierarchical`, `strict` or a rule's name";
+            if let Some(modifier) = self.keyword_among(&MODIFIERS, expected) {
+                let range = self.bump();
+                let modifier = Name::new(modifier, self.span(range.clone()));
+                if header.modifiers.contains(&modifier) {
+                    self.repeated(range, format!("`{modifier}`"));
+                }
+                header.modifiers.push(modifier);
+                continue;
+            }
+            // What no word was meant to be is told once, and the name may still come.
+            while self.is_word_at(self.at + 1) || self.is_digits(self.at + 1) {
+                self.bump();
+            }
+            return self.is_symbol_at(self.at + 1, ":").then_some(());
         }
         Some(())
     }
@@ -171,26 +179,32 @@ impl Parser<'_> {
         Some(())
     }
 
-    /// After a broken clause: skips to the next one or to the body.
-    fn skip_clause(&mut self) {
+    /// After a broken clause that began at token `start`: skips to the next one or to the body.
+    fn skip_clause(&mut self, start: usize) {
+        self.at = self.at.max(start + 1).min(self.limit);
+        let count = |symbol| {
+            let places = start..self.at;
+            places.filter(|&at| self.is_symbol_at(at, symbol)).count()
+        };
+        let mut open = count("(").saturating_sub(count(")"));
         while self.peek().is_some() && !self.is_symbol("{") {
-            self.bump();
-            if CLAUSES.contains(&self.token_text(self.at)) && self.is_symbol_at(self.at + 1, "(") {
+            let begins = self.is_word_at(self.at) && self.is_symbol_at(self.at + 1, "(");
+            let keyword = |keyword: &&str| self.is_keyword(self.at, keyword, "(");
+            if begins && (open == 0 || CLAUSES.iter().any(keyword)) {
                 break;
             }
+            open += usize::from(self.is_symbol("("));
+            open = open.saturating_sub(usize::from(self.is_symbol(")")));
+            self.bump();
         }
     }
 
     fn clause(&mut self, header: &mut Header) -> Option<()> {
-        let word = self.token_text(self.at);
-        if !CLAUSES.contains(&word) {
-            self.expected(
-                "`{`, `success`, `activates`, `cost`, `duration` or `agent`",
-                &CLAUSES,
-            );
-            return None;
-        }
+        let expected = "`{`, `success`, `activates`, `cost`, `duration` or `agent`";
+        let word = self.keyword_among(&CLAUSES, expected)?;
         let range = self.bump();
+        let name = Name::new(word, self.span(range.clone()));
+        header.clauses.push(name);
         let repeated = match word {
             "cost" => header.cost.replace(self.amount("the cost")?).is_some(),
             "duration" => header
@@ -262,7 +276,7 @@ impl Parser<'_> {
         self.report(place, Problem::OutOfRange { what, range, found });
     }
 
-    fn repeated(&mut self, range: Range<usize>, what: String) {
+    pub(super) fn repeated(&mut self, range: Range<usize>, what: String) {
         self.report(range, Problem::Repeated { what });
     }
 
@@ -274,11 +288,14 @@ impl Parser<'_> {
         if (word && !self.at_section()) || self.is_digits(self.at) {
             return self.combo_body(header, opening);
         }
-        let Some(left) = self.graph("`{` and the left side") else {
+        let Some(left) = self.graph("`{` and the left side, or a step `rule as alias`") else {
             self.skip_braces(1);
             return None;
         };
-        self.expect("=>", "`=>` between the two sides");
+        let arrow = self.expect("=>", "`=>` between the two sides");
+        if arrow.is_none() && self.is_symbol_at(self.at + 1, "{") {
+            self.bump();
+        }
         let Some(right) = self.graph("`{` and the right side") else {
             self.skip_braces(1);
             return None;
@@ -296,9 +313,8 @@ impl Parser<'_> {
             if token.kind != TokenKind::Word {
                 break;
             }
-            let word = self.token_text(self.at);
-            if !SECTIONS.contains(&word) {
-                self.expected("`parameters`, `precondition`, `effect` or `}`", &SECTIONS);
+            let expected = "`parameters`, `precondition`, `effect` or `}`";
+            let Some(word) = self.keyword_among(&SECTIONS, expected) else {
                 let start = self.at;
                 self.bump();
                 if self.eat("{") {
@@ -306,7 +322,7 @@ impl Parser<'_> {
                 }
                 self.lose(start..self.at);
                 continue;
-            }
+            };
             let range = self.bump();
             let Some(opening) = self.expect("{", "`{`") else {
                 self.skip_line();
@@ -356,101 +372,6 @@ impl Parser<'_> {
         let parameter = self.rest_of_node(variable)?;
         self.eat(",");
         Some(parameter)
-    }
-
-    fn combo_body(&mut self, header: Header, opening: Range<usize>) -> Option<Action> {
-        let mut steps = Vec::new();
-        let mut equalities = Vec::new();
-        let mut where_seen = false;
-        while !self.eat("}") {
-            if self.peek().is_none() {
-                self.unclosed(opening, '{');
-                return None;
-            }
-            let before = self.at;
-            let read = if self.is_word("where") && self.is_symbol_at(self.at + 1, ":") {
-                self.bump();
-                let range = self.bump();
-                if std::mem::replace(&mut where_seen, true) {
-                    self.repeated(range, "`where:`".to_owned());
-                }
-                Some(())
-            } else if where_seen {
-                self.equality().map(|equality| equalities.push(equality))
-            } else {
-                self.combo_step().map(|step| steps.push(step))
-            };
-            if read.is_none() {
-                self.skip_broken_line(before);
-            }
-        }
-        let plain = header.cost.is_none()
-            && header.duration.is_none()
-            && header.agent.is_none()
-            && header.success.is_none()
-            && header.activates.is_none()
-            && header.modifiers.is_empty();
-        if !plain {
-            let span = header.name.span();
-            let problem = Problem::Expected {
-                expected: "a combo rule without clauses or modifiers".to_owned(),
-                found: "some".to_owned(),
-                suggestion: None,
-            };
-            self.report(span.start..span.end, problem);
-        }
-        Some(Action::Combo(Combo {
-            name: header.name,
-            cost: header.constant_cost.as_number().unwrap_or_default(),
-            kind: header.kind,
-            steps,
-            equalities,
-            comments: Vec::new(),
-        }))
-    }
-
-    fn combo_step(&mut self) -> Option<ComboStep> {
-        let rule = self.name("a step `rule as alias`, or `where:`")?;
-        if !self.is_word("as") {
-            self.expected("`as` and an alias", &["as"]);
-            return None;
-        }
-        self.bump();
-        let alias = self.name("an alias")?;
-        // On the next line it would be the rule of the next step.
-        let optional =
-            self.is_word("optional") && self.peek().is_some_and(|token| !token.first_on_line);
-        if optional {
-            self.bump();
-        }
-        Some(ComboStep {
-            rule,
-            alias,
-            optional,
-        })
-    }
-
-    fn equality(&mut self) -> Option<Vec<ComboVariable>> {
-        let bracketed = self.eat("(");
-        let mut variables = vec![self.combo_variable()?];
-        while self.eat("=") {
-            variables.push(self.combo_variable()?);
-        }
-        if variables.len() < 2 {
-            self.expected("`=` and another `alias.variable`", &[]);
-            return None;
-        }
-        if bracketed {
-            self.expect(")", "`)`")?;
-        }
-        Some(variables)
-    }
-
-    fn combo_variable(&mut self) -> Option<ComboVariable> {
-        let alias = self.name("`alias.variable`")?;
-        self.expect(".", "`.` and a variable")?;
-        let variable = self.name("a variable")?;
-        Some(ComboVariable { alias, variable })
     }
 }
 
