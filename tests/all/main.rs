@@ -28,6 +28,7 @@ mod path;
 mod plan;
 mod recording;
 mod robocomp_rules;
+mod rule_amounts;
 mod rules;
 mod run;
 mod social;

@@ -367,7 +367,7 @@ fn a_rule_is_tried_and_its_change_shown_or_why_there_is_none() {
     assert_eq!(code, 0);
     assert_eq!(
         out,
-        "changeRoom  r=rob a=r3 b=r4\n    - rob -in-> r3\n    + rob -in-> r4\n"
+        "changeRoom  r=rob a=r3 b=r4\n    - rob -in-> r3\n    + rob -in-> r4\ncost 1\n"
     );
     let (_, applied) = json(&folder, "apply", "a.aggl", &bound);
     assert_eq!(

@@ -1,4 +1,4 @@
-//! Attributes that are assigned to links which need not be there.
+//! Attributes that are assigned to links which need not be there afterwards.
 //!
 //! Guarantee: where nothing is told, the rule makes the link or asks for it and does not take it away.
 
@@ -13,6 +13,8 @@ type Link<'r> = (&'r Name, &'r Name, &'r Name);
 #[derive(Clone)]
 struct Known<'r> {
     links: Vec<Link<'r>>,
+    /// Those of the right side.
+    wanted: Vec<Link<'r>>,
     /// Those that it takes away.
     gone: Vec<Link<'r>>,
 }
@@ -51,9 +53,20 @@ impl<'r> Known<'r> {
 
     fn effects(&self, effects: &'r [Effect], findings: &mut Vec<Finding>) {
         let mut known = self.clone();
+        let unlinked = effects.iter().filter_map(|effect| match effect {
+            Effect::Unlink { label, from, to } => Some((from, label, to)),
+            _ => None,
+        });
+        // What the right side wants is there whatever effects say.
+        known
+            .gone
+            .extend(unlinked.filter(|link| !self.wanted.contains(link)));
         for effect in effects {
             match effect {
-                Effect::Link { label, from, to } => known.links.push((from, label, to)),
+                Effect::Link { label, from, to } => {
+                    known.gone.retain(|gone| *gone != (from, label, to));
+                    known.links.push((from, label, to));
+                }
                 // A value that is not there would keep the rule from being applied.
                 Effect::Assign { value, .. } => {
                     for path in value.paths() {
@@ -81,10 +94,13 @@ impl<'r> Known<'r> {
         if let AttributePath::Edge {
             from, label, to, ..
         } = target
-            && !self.links.contains(&(from, label, to))
         {
             let link = format!("{from}->{to}({label})");
-            findings.push(at(label, Problem::MaybeNoLink { link }));
+            if self.gone.contains(&(from, label, to)) {
+                findings.push(at(label, Problem::LinkTaken { link }));
+            } else if !self.links.contains(&(from, label, to)) {
+                findings.push(at(label, Problem::MaybeNoLink { link }));
+            }
         }
     }
 }
@@ -98,15 +114,17 @@ pub(super) fn links(rule: &Rule, findings: &mut Vec<Finding>) {
         starred.is_some_and(|edge| edge.negated)
             || !edge.negated && !stays(&edge.from, &edge.label, &edge.to)
     });
+    let wanted = right.iter().filter(|edge| !edge.negated);
+    let wanted: Vec<Link<'_>> = wanted
+        .map(|edge| (&edge.from, &edge.label, &edge.to))
+        .collect();
     let mut known = Known {
-        links: Vec::new(),
+        links: wanted.clone(),
+        wanted,
         gone: goes
             .map(|edge| (&edge.from, &edge.label, &edge.to))
             .collect(),
     };
-    for edge in right.iter().filter(|edge| !edge.negated) {
-        known.add((&edge.from, &edge.label, &edge.to));
-    }
     rule.precondition
         .iter()
         .for_each(|condition| known.ask(condition));

@@ -76,10 +76,11 @@ pub(super) struct Together<'r> {
     pub(super) conditions: Vec<&'r Condition>,
 }
 
-/// Why a rule's left side and precondition hold nowhere, if that can be seen.
+/// Why a rule's left side and precondition, and `more`, hold nowhere, if that can be seen.
 pub(super) fn contradiction(
     grammar: &Grammar,
     rule: &Rule,
+    more: &[Condition],
     schema: Option<&Schema>,
 ) -> Option<String> {
     let nodes = rule.bound_nodes();
@@ -88,7 +89,7 @@ pub(super) fn contradiction(
         schema,
         nodes: nodes.map(|n| (&n.variable, vec![&n.type_name])).collect(),
         links: rule.left.edges.iter().collect(),
-        conditions: rule.precondition.iter().collect(),
+        conditions: rule.precondition.iter().chain(more).collect(),
     };
     together.contradiction().0
 }

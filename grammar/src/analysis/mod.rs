@@ -52,6 +52,8 @@ impl Grammar {
         for rule in &self.rules {
             if let Some(reason) = never::why_never(self, rule, schema) {
                 findings.push(at(&rule.name, Problem::NeverMatches { reason }));
+            } else {
+                never::amounts(self, rule, schema, &mut findings);
             }
             unused::variables(rule, &mut findings);
             adrift::links(rule, &mut findings);

@@ -1,17 +1,60 @@
-//! Rules that match in no graph.
+//! Rules that match in no graph, or that cost nothing sayable wherever they match.
 //!
 //! Guarantee: a reason is only given where there is no match whatever the graph, or whatever the
 //! graph that the schema allows.
 
+use super::at;
 use super::contradiction::contradiction;
 use crate::matching::{MatchDomain, conjuncts};
-use crate::{Condition, Grammar, Name, Rule};
+use crate::parser::Finding;
+use crate::{
+    AttributePath, Comparison, Condition, Expression, Grammar, Literal, Name, Problem, Rule,
+};
 use dsr::{Schema, TypeId};
 
 /// Why the rule never matches, if that can be seen.
 pub(super) fn why_never(grammar: &Grammar, rule: &Rule, schema: Option<&Schema>) -> Option<String> {
     let conditions: Vec<&Condition> = rule.precondition.iter().flat_map(conjuncts).collect();
-    contradiction(grammar, rule, schema).or_else(|| types(grammar, rule, &conditions, schema?))
+    contradiction(grammar, rule, &[], schema).or_else(|| types(grammar, rule, &conditions, schema?))
+}
+
+/// Reports a cost or duration that, at every match of the rule, has no value or one below 0.
+pub(super) fn amounts(
+    grammar: &Grammar,
+    rule: &Rule,
+    schema: Option<&Schema>,
+    findings: &mut Vec<Finding>,
+) {
+    for amount in [Some(&rule.cost), rule.duration.as_ref()]
+        .into_iter()
+        .flatten()
+    {
+        let paths = amount.paths();
+        let Some(AttributePath::Node { attribute, .. } | AttributePath::Edge { attribute, .. }) =
+            paths.first()
+        else {
+            continue;
+        };
+        let links = paths.iter().filter_map(|path| match path {
+            AttributePath::Edge {
+                from, label, to, ..
+            } => Some(Condition::Edge {
+                from: from.clone(),
+                label: label.clone(),
+                to: to.clone(),
+            }),
+            AttributePath::Node { .. } => None,
+        });
+        let mut wanted: Vec<Condition> = links.collect();
+        wanted.push(Condition::Compare {
+            operator: Comparison::GreaterOrEqual,
+            left: Box::new(amount.clone()),
+            right: Box::new(Expression::Literal(Literal::Integer(0))),
+        });
+        if let Some(reason) = contradiction(grammar, rule, &wanted, schema) {
+            findings.push(at(attribute, Problem::NeverAmount { reason }));
+        }
+    }
 }
 
 /// A node of which the links ask more than any type of the schema can have.

@@ -63,13 +63,43 @@ c : active(1) { { a:t b:t } => { a:t b:t } precondition { (> e(a, l, b).d 2) }
 d : active(1) { { a:t } => { a:t } effect { (forall q:t (when (l a q) (assign e(a, l, q).d 1))) } }
 e : active(1) { { a:t } => { a:t } effect { (forall q:t (assign e(a, l, q).d (+ e(a, l, q).d 1))) } }
 f : active(1) { { a:t } => { a:t } effect { (forall q:t (assign e(a, l, q).d 1)) } }
+g : active(1) { { a:t b:t a->b(l) } => { a:t b:t a->b(l)* } effect { (assign e(a, l, b).d 1) } }
+h : active(1) { { a:t b:t a->b(l) b->a(l) } => { a:t b:t b->a(l) } precondition { (l a b) }
+ effect { (not (l a b)) (assign e(a, l, b).d 1) (not (l b a)) (assign e(b, l, a).d 1) } }
+i : active(1) { { a:t b:t } => { a:t b:t } precondition { (l a b) } effect { (not (l a b)) (assign e(a, l, b).d 1) } }
+j : active(1) { { a:t b:t a->b(l) } => { a:t b:t } effect { (l a b) (assign e(a, l, b).d 1) } }
 ";
     check(
         read(text).analyse(None),
         &expect![[r#"
-        test.aggl:4:48: warning: nothing in this rule says that there is a link `b->a(l)`: where there is none, nothing is assigned
-        test.aggl:5:74: warning: nothing in this rule says that there is a link `a->b(l)`: where there is none, nothing is assigned
-        test.aggl:10:70: warning: nothing in this rule says that there is a link `a->q(l)`: where there is none, nothing is assigned"#]],
+            test.aggl:4:48: warning: nothing in this rule says that there is a link `b->a(l)`: where there is none, nothing is assigned
+            test.aggl:5:74: warning: this rule takes away the link `a->b(l)`, so that nothing is assigned to it
+            test.aggl:10:70: warning: nothing in this rule says that there is a link `a->q(l)`: where there is none, nothing is assigned
+            test.aggl:11:83: warning: this rule takes away the link `a->b(l)`, so that nothing is assigned to it
+            test.aggl:13:38: warning: this rule takes away the link `a->b(l)`, so that nothing is assigned to it
+            test.aggl:14:105: warning: this rule takes away the link `a->b(l)`, so that nothing is assigned to it"#]],
+    );
+}
+
+#[test]
+fn an_amount_that_no_match_gives_is_told_at_its_attribute() {
+    let text = "name=x
+===
+a : active(1) cost(x.v) { { x:t } => { x:t } precondition { (< x.v 0) } }
+b : active(1) duration(e(x, q, x).v) { { x:t x->x(q)* } => { x:t } }
+d : active(1) cost(x.v) duration(e(x, q, y).v) { { x:t y:t } => { x:t y:t } precondition { (or (< x.v 0) (q x y)) } }
+e : active(1) cost(x.v) { { x:t } => { x:t } precondition { (and (< x.v 0) (> x.v 0)) } }
+f : active(1) duration(x.v) { { x:t } => { x:t } precondition { (= x.v \"long\") } }
+";
+    let mut found = read(text).analyse(None);
+    found.retain(|found| !matches!(found.problem, Problem::UnusedVariable { .. }));
+    check(
+        found,
+        &expect![[r#"
+        test.aggl:3:22: warning: this is a number of 0 or more at no match of the rule: no `x.v` is (>= 0) and (< 0)
+        test.aggl:4:35: warning: this is a number of 0 or more at no match of the rule: `x->x(q)` would have to be there and not
+        test.aggl:6:1: warning: this rule never matches: no `x.v` is (< 0) and (> 0)
+        test.aggl:7:26: warning: this is a number of 0 or more at no match of the rule: no `x.v` is (>= 0) and (= "long")"#]],
     );
 }
 

@@ -20,6 +20,7 @@ mod program;
 mod query;
 mod search;
 mod statistics;
+mod values;
 mod watch;
 
 pub use environment::{CHOICE_LIMIT, SEARCH_LIMIT, WHOLE_LIMIT};
@@ -35,11 +36,11 @@ pub(crate) use domain::Domain as MatchDomain;
 pub(crate) use environment::{Environment, Interrupt};
 pub(crate) use frame::{Frame, Slots};
 pub(crate) use host::{Host, Way};
-pub(crate) use obstacle::words;
 pub(crate) use plan::Plan;
 pub(crate) use planned::Planned;
 pub(crate) use program::{Compiler, Link, Slot, Term, Test};
 pub(crate) use query::Problem;
+pub(crate) use values::words;
 
 use crate::{Binding, Condition, Expression, Grammar, Number, PatternEdge, PatternNode, Rule};
 use dsr::{ReadError, Snapshot, Value};
@@ -291,7 +292,7 @@ impl Grammar {
             Some(amount) if amount >= 0.0 && amount.is_finite() => Ok(amount),
             _ => Err(ValueError::NotACost {
                 expression: expression.to_string(),
-                value: obstacle::words(&value),
+                value: words(&value),
             }),
         }
     }
@@ -319,7 +320,7 @@ impl Grammar {
             Some(value) => Ok(value),
             None => Err(ValueError::Undefined {
                 expression: expression.to_string(),
-                values: obstacle::values(snapshot, &compiler, &environment, &[expression])?,
+                values: values::values(snapshot, &compiler, &environment, &[expression])?,
             }),
         }
     }

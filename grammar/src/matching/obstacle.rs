@@ -6,11 +6,10 @@ use super::environment::{CHOICE_LIMIT, Environment, node};
 use super::evaluate::is_there;
 use super::host::Way;
 use super::program::Compiler;
+use super::values::values;
 use super::{MatchDomain, MatchError, Problem, conjuncts};
-use crate::{
-    AttributePath, Binding, Condition, Expression, Grammar, Name, PatternEdge, PatternNode, Rule,
-};
-use dsr::{LabelId, NodeId, ReadError, Snapshot, Value};
+use crate::{Binding, Condition, Grammar, Name, PatternEdge, PatternNode, Rule};
+use dsr::{LabelId, NodeId, ReadError, Snapshot};
 use std::fmt;
 
 /// A variable and the node that it is bound to.
@@ -438,56 +437,5 @@ impl Words<'_, '_> {
             }
         };
         Ok((formula, reason))
-    }
-}
-
-/// The attributes in expressions and their values: `a.x = 3, b.y is missing`.
-pub(crate) fn values(
-    snapshot: &Snapshot,
-    compiler: &Compiler<'_>,
-    environment: &Environment,
-    expressions: &[&Expression],
-) -> Result<String, MatchError> {
-    let mut paths: Vec<&AttributePath> = Vec::new();
-    for expression in expressions {
-        collect_paths(expression, &mut paths);
-    }
-    let mut known = Vec::new();
-    for path in paths {
-        let term = compiler.term(&Expression::Attribute(path.clone()))?;
-        known.push(match term.value(snapshot, environment)? {
-            Some(value) => format!("{path} = {}", words(&value)),
-            None => format!("{path} is missing"),
-        });
-    }
-    known.dedup();
-    Ok(known.join(", "))
-}
-
-fn collect_paths<'a>(expression: &'a Expression, paths: &mut Vec<&'a AttributePath>) {
-    match expression {
-        Expression::Literal(_) => {}
-        Expression::Attribute(path) => paths.push(path),
-        Expression::Arithmetic { operands, .. } => {
-            for operand in operands {
-                collect_paths(operand, paths);
-            }
-        }
-    }
-}
-
-/// A value as a message shows it.
-pub(crate) fn words(value: &Value) -> String {
-    match value {
-        Value::Bool(value) => value.to_string(),
-        Value::I32(value) => value.to_string(),
-        Value::U32(value) => value.to_string(),
-        Value::I64(value) => value.to_string(),
-        Value::U64(value) => value.to_string(),
-        Value::F32(value) => value.to_string(),
-        Value::F64(value) => value.to_string(),
-        Value::String(text) => format!("{text:?}"),
-        Value::Vector(row) => format!("{row:?}"),
-        other => format!("a {}", other.kind()),
     }
 }

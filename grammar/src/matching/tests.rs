@@ -182,7 +182,7 @@ fn cost_and_duration_come_from_the_link() {
     assert_eq!(
         error.to_string(),
         "`e(room1, connected, room2).distance` has no value: \
-         e(room1, connected, room2).distance is missing"
+         e(room1, connected, room2).distance is missing, as room1 (hall) has no link `connected` to room2 (ward)"
     );
 }
 

@@ -1,6 +1,7 @@
 //! `cortex rules apply`: what a rule changes. In a file's world it is only tried, on a graph of this
 //! process; in a running system the store applies it.
 
+use super::amounts::amounts;
 use super::{Names, World, find_rule, load, unmatched, words};
 use crate::cli::WorldArgs;
 use crate::commands::graph::no_such;
@@ -120,13 +121,16 @@ pub(super) fn apply(
         // Writing to a string does not fail.
         let _ = writeln!(text, "    {line}");
     }
+    let amounts = amounts(&grammar, &snapshot, rule, &binding)?;
     if as_json {
-        let cost = grammar.cost(&snapshot, rule, &binding).ok();
-        print_json(&json!({
-            "rule": name, "applicable": true, "binding": named, "cost": cost, "operations": rows,
+        let mut object = json!({
+            "rule": name, "applicable": true, "binding": named, "operations": rows,
             "committed": version.is_some(), "version": version,
-        }))?;
+        });
+        amounts.put(&mut object);
+        print_json(&object)?;
     } else {
+        let _ = writeln!(text, "{}", amounts.words());
         if let Some(version) = version {
             // Writing to a string does not fail.
             let _ = writeln!(text, "version {version}");

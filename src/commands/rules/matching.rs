@@ -1,5 +1,6 @@
 //! `cortex rules match`: where left-hand sides hold in a world.
 
+use super::amounts::{Amounts, amounts};
 use super::{Names, World, find_rule, load, unmatched, words};
 use crate::cli::WorldArgs;
 use crate::commands::output::{print, print_json};
@@ -94,6 +95,11 @@ pub(super) fn matches(
     let mut rows = Vec::new();
     for one in rules {
         let found = find(&grammar, &snapshot, one, listed.unwrap_or(0))?;
+        let amounts = found
+            .matches
+            .iter()
+            .map(|at| amounts(&grammar, &snapshot, one, at));
+        let amounts = amounts.collect::<Result<Vec<_>, _>>()?;
         if as_json {
             let mut row = json!({
                 "rule": &*one.name, "count": found.count, "complete": found.complete,
@@ -102,13 +108,25 @@ pub(super) fn matches(
             if listed.is_some() {
                 let named = found.matches.iter().map(|binding| names.of_all(binding));
                 row["matches"] = json!(named.collect::<Result<Vec<_>, _>>()?);
+                let missing = amounts.iter().map(Amounts::missing_json).enumerate();
+                let missing = missing.filter_map(|(place, mut missing)| {
+                    let any = missing
+                        .as_object()
+                        .is_some_and(|missing| !missing.is_empty());
+                    missing["match"] = json!(place);
+                    any.then_some(missing)
+                });
+                row["amounts_missing"] = missing.collect();
             }
             rows.push(row);
             continue;
         }
         print(&heading(one, &found))?;
-        for binding in &found.matches {
+        for (binding, amounts) in found.matches.iter().zip(&amounts) {
             print(&format!("    {}\n", words(one, &names.of_all(binding)?)))?;
+            for (what, why) in amounts.missing() {
+                print(&format!("        no {what}: {why}\n"))?;
+            }
         }
         let more = found.count - found.matches.len() as u64;
         if listed.is_some() && more > 0 {

@@ -1,6 +1,7 @@
 //! `cortex rules`: what a grammar says, what is wrong with it, where its rules hold in a world and
 //! what they would change there. Nothing here writes to any file.
 
+mod amounts;
 mod apply;
 mod check;
 mod explain;

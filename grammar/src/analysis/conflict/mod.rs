@@ -171,7 +171,7 @@ fn pairs<'a>(
     effort: &mut Effort,
 ) -> (Vec<Pair<'a>>, usize) {
     let rules = &grammar.rules;
-    let of = |rule: &'a Rule| match contradiction(grammar, rule, schema) {
+    let of = |rule: &'a Rule| match contradiction(grammar, rule, &[], schema) {
         // What never matches disables nothing, and nothing disables it.
         Some(_) => Touched::default(),
         None => Touched::of(kinds, rule),
