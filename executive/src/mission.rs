@@ -7,6 +7,7 @@ mod adopt;
 mod attend;
 mod culprit;
 mod decision;
+mod failures;
 mod file;
 mod outcomes;
 mod pursue;

@@ -67,8 +67,8 @@ pub(crate) enum Finding {
     },
     /// It is not possible any more.
     Broken(String),
-    /// Its agent took too long.
-    TimedOut(String),
+    /// It has been in its agent's hands for longer than this, seconds.
+    TimedOut(f64),
 }
 
 /// A step's rule and the nodes that it is bound to.
@@ -194,7 +194,7 @@ fn next(
     if !pending {
         let limit = limit(grammar, snapshot, &ground)?;
         if now.since(step.since) > limit {
-            return Ok(Finding::TimedOut(format!("timed out after {limit:.0} s")));
+            return Ok(Finding::TimedOut(limit));
         }
     }
     let ahead = ahead(grammar, snapshot, &ground, later, goal)?;

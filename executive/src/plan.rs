@@ -7,7 +7,8 @@ mod narrow;
 mod reason;
 
 use crate::ground::{
-    Environment, Ground, Instance, Operator, Problem, ProblemError, Reached, Scope, build,
+    Environment, Ground, Instance, Object, Operator, Problem, ProblemError, Reached, Scope,
+    UNBOUND, build,
 };
 use crate::search::{Answer, Effort, Limits, Reachability, StopReason, search};
 use crate::task::{Micro, from_micro};
@@ -71,7 +72,7 @@ pub struct Outcome {
 pub struct Raised {
     /// The rule.
     pub rule: String,
-    /// As in [`Step::binding`].
+    /// As in [`Step::binding`]; a variable that is left out stands for any node.
     pub binding: BTreeMap<String, String>,
     /// By how much; infinity excludes it.
     pub by: f64,
@@ -342,6 +343,12 @@ fn solved(
     }
 }
 
+/// Whether some nodes are those of a binding, which may leave some open.
+fn covers(binding: &[Object], objects: &[Object]) -> bool {
+    let mut pairs = binding.iter().zip(objects);
+    pairs.all(|(bound, object)| *bound == UNBOUND || bound == object)
+}
+
 /// What the options say of steps that are dearer than their rules say, or excluded.
 fn raised(problem: &Problem, options: &Options) -> Vec<(usize, Environment, f64)> {
     let all = options.raised.iter();
@@ -365,9 +372,8 @@ fn ground(
 ) -> Result<Ground, StopReason> {
     let raised = raised(problem, options);
     let extra = |instance: &Instance| -> f64 {
-        let bound = problem.program.operators[instance.operator].bound;
-        let same = raised.iter().filter(|(operator, environment, _)| {
-            *operator == instance.operator && environment[..bound] == instance.objects[..bound]
+        let same = raised.iter().filter(|(operator, binding, _)| {
+            *operator == instance.operator && covers(binding, &instance.objects)
         });
         same.map(|(_, _, by)| by).sum()
     };

@@ -14,6 +14,7 @@ use super::reach::{Instance, Reached};
 use super::value::amount;
 use crate::search::{Limits, StopReason};
 use crate::task::{Action, Effect, Fact, Formula, Micro, Task, keep, micro, relevant};
+use dsr::Value;
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeMap;
 
@@ -41,8 +42,20 @@ pub(crate) struct Ground {
     pub(crate) costs: Vec<Micro>,
     /// The facts of the task.
     pub(crate) atoms: Vec<Atom>,
-    /// Rules whose cost has no value somewhere.
-    pub(crate) notes: Vec<String>,
+    /// Rules that were left out where they cost nothing that can be reckoned with.
+    pub(crate) unpriced: Vec<Unpriced>,
+}
+
+/// A rule that was left out at some bindings, where its cost has no value, or one that is no amount.
+#[derive(Debug)]
+pub(crate) struct Unpriced {
+    pub(crate) operator: usize,
+    /// The first of the bindings.
+    pub(crate) objects: Vec<Object>,
+    /// What its cost is there.
+    pub(crate) value: Option<Value>,
+    /// How many bindings.
+    pub(crate) times: usize,
 }
 
 /// What an instance costs besides its rule's cost; infinity excludes it.
@@ -95,17 +108,32 @@ pub(crate) fn build(
     let wanted: Vec<Formula> = wanted.collect();
     let wanted = Formula::any(wanted);
     let mut drafts: Vec<(usize, Formula, Changes, Micro, Micro)> = Vec::new();
-    let mut without_cost = vec![false; program.operators.len()];
+    let mut unpriced: Vec<Unpriced> = Vec::new();
     let mut bytes = reached.bytes;
     for (index, instance) in reached.instances.iter().enumerate() {
         let operator = &program.operators[instance.operator];
         let more = extra(instance);
         let objects = &instance.objects;
-        let mut priced = Vec::new();
+        let (mut priced, mut left_out) = (Vec::new(), None);
         for (choice, value) in combinations(&operator.cost, objects, &reached.facts, program) {
             match amount(value.as_ref()) {
                 Some(cost) => priced.push((choice, cost)),
-                None => without_cost[instance.operator] = true,
+                None => left_out = Some(value),
+            }
+        }
+        if let Some(value) = left_out {
+            let same = |known: &&mut Unpriced| {
+                let alike = known.value.is_some() == value.is_some();
+                known.operator == instance.operator && alike
+            };
+            match unpriced.iter_mut().find(same) {
+                Some(known) => known.times += 1,
+                None => unpriced.push(Unpriced {
+                    operator: instance.operator,
+                    objects: objects.clone(),
+                    value,
+                    times: 1,
+                }),
             }
         }
         if more.is_infinite() || priced.is_empty() {
@@ -128,14 +156,6 @@ pub(crate) fn build(
             limits.check(bytes)?;
         }
     }
-    let without_cost = program.operators.iter().zip(without_cost);
-    let without_cost = without_cost.filter(|(_, without)| *without);
-    let notes = without_cost
-        .map(|(operator, _)| {
-            let rule = &operator.name;
-            format!("the cost of rule `{rule}` has no value somewhere")
-        })
-        .collect();
     let mut actions = Vec::new();
     let (mut which, mut costs) = (Vec::new(), Vec::new());
     for (index, precondition, changes, cost, raised) in drafts {
@@ -164,7 +184,7 @@ pub(crate) fn build(
         actions: keep(which, &relevant),
         costs: keep(costs, &relevant),
         atoms: builder.atoms,
-        notes,
+        unpriced,
     })
 }
 

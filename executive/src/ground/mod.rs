@@ -18,7 +18,7 @@ mod vocabulary;
 mod words;
 mod world;
 
-pub(crate) use build::{Atom, Ground, build};
+pub(crate) use build::{Atom, Ground, Unpriced, build};
 pub(crate) use facts::Facts;
 pub(crate) use join::{Found, Plan as Join};
 pub(crate) use program::{Environment, Link, Object, Operator, Place, UNBOUND, Variable};
@@ -208,13 +208,35 @@ impl Problem {
         links.chain(absent).chain(tests).collect()
     }
 
+    /// Why a rule was left out at some bindings, in words.
+    pub(crate) fn unpriced(&self, unpriced: &Unpriced) -> String {
+        let operator = &self.program.operators[unpriced.operator];
+        let (rule, objects) = (&operator.name, &unpriced.objects);
+        let variables = operator.variables[..operator.bound].iter().zip(objects);
+        let binding: Vec<String> = variables
+            .map(|(variable, &object)| format!("{}={}", variable.name, self.name(object)))
+            .collect();
+        let binding = binding.join(", ");
+        let cost = self.words().term(&operator.cost, operator, objects);
+        let is = match unpriced.value.as_ref().map(dsr::Value::as_f64) {
+            None => "has no value".to_owned(),
+            Some(None) => "is no number".to_owned(),
+            Some(Some(amount)) => format!("is {amount}, and costs are 0 or more"),
+        };
+        let others = match unpriced.times {
+            1 => String::new(),
+            times => format!(" (and at {} other bindings)", times - 1),
+        };
+        format!("{rule}({binding}) was left out, since its cost {cost} {is}{others}")
+    }
+
     /// The operator of a rule.
     pub(crate) fn operator(&self, rule: &str) -> Option<usize> {
         let mut operators = self.program.operators.iter();
         operators.position(|operator| operator.name == rule)
     }
 
-    /// An operator's environment at a binding of variables to names of nodes.
+    /// What an operator's variables stand for by names of nodes, [`UNBOUND`] where there is none.
     pub(crate) fn environment<'n>(
         &self,
         operator: usize,
@@ -227,8 +249,8 @@ impl Problem {
             let slot = variables.iter().position(|v| v.name == variable)?;
             environment[slot] = self.world.object_named(name)?;
         }
-        let bound = &environment[..operator.bound];
-        (!bound.contains(&UNBOUND)).then_some(environment)
+        environment.truncate(operator.bound);
+        Some(environment)
     }
 }
 

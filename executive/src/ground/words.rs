@@ -95,7 +95,8 @@ impl Words<'_> {
         }
     }
 
-    fn term(&self, term: &Term, operator: &Operator, environment: &[Object]) -> String {
+    /// An expression as AGGL writes it, with names for bound variables.
+    pub(crate) fn term(&self, term: &Term, operator: &Operator, environment: &[Object]) -> String {
         match term {
             Term::Constant(value) => format!("{value:?}"),
             Term::Place(Place::Node(slot, attribute)) => {

@@ -3,10 +3,11 @@
 //! too goes on as the same node, and that no two steps of a mission ever have the same name.
 
 use super::decision::Occasion;
+use super::failures::Failures;
 use super::outcomes;
 use super::record::{Mission, Step};
 use super::{Executive, MissionStatus, Planner, StepStatus, Turn, drop_open};
-use crate::{Outcome, Raised, Status};
+use crate::{Outcome, Status};
 use dsr::{ReadError, Time};
 use std::collections::BTreeSet;
 
@@ -26,9 +27,11 @@ impl<P: Planner> Executive<P> {
         if self.search.not_before.is_some_and(|time| turn.now < time) {
             return Ok(Sought::NotNow);
         }
-        let (raised, left_out) = self.failures(turn.now, mission);
+        let failures = Failures::of(&mission.steps, turn.now, &self.config);
         let mut options = self.config.options.clone();
-        options.raised.extend(raised);
+        options
+            .raised
+            .extend(failures.raised(&self.grammar, &self.config));
         let grammar = outcomes::learned(&self.grammar, turn.snapshot)?;
         let outcome = self.planner.plan(
             &grammar,
@@ -45,7 +48,7 @@ impl<P: Planner> Executive<P> {
             Status::Unsolvable | Status::Limit => {
                 let reason = outcome.reason.unwrap_or_default();
                 let mut words = vec![format!("no plan: {reason}")];
-                words.extend(left_out);
+                words.extend(failures.left_out(&self.config));
                 Sought::Nothing(words.join("; "))
             }
         };
@@ -57,37 +60,6 @@ impl<P: Planner> Executive<P> {
         };
         self.search.not_before = Some(turn.now + wait);
         Ok(sought)
-    }
-
-    /// What failed lately and shall cost more, and in words what failed too often.
-    fn failures(&self, now: Time, mission: &Mission) -> (Vec<Raised>, Vec<String>) {
-        let mut failures: Vec<(&Step, usize)> = Vec::new();
-        for step in mission.steps.iter().rev() {
-            let past = now.since(step.since) > self.config.memory;
-            if step.status != StepStatus::Failed || past {
-                continue;
-            }
-            let same = |known: &Step| known.rule == step.rule && known.binding == step.binding;
-            match failures.iter_mut().find(|(known, _)| same(known)) {
-                Some((_, times)) => *times += 1,
-                None => failures.push((step, 1)),
-            }
-        }
-        let excluded = |times: usize| times >= self.config.tries;
-        let raised = failures.iter().map(|&(step, times)| Raised {
-            rule: step.rule.clone(),
-            binding: step.binding.clone(),
-            by: if excluded(times) {
-                f64::INFINITY
-            } else {
-                self.config.penalty * times as f64
-            },
-        });
-        let words = failures
-            .iter()
-            .filter(|(_, times)| excluded(*times))
-            .map(|(step, times)| format!("{step} failed {times} times: {}", step.reason));
-        (raised.collect(), words.collect())
     }
 
     /// Puts a new plan into force.

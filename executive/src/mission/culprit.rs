@@ -65,7 +65,7 @@ pub(super) fn given_up(turn: Turn, mission: &Mission) -> Result<Option<Occasion>
     let last = first
         .checked_sub(1)
         .and_then(|last| mission.steps.get(last));
-    let failed = last.filter(|last| last.status == super::StepStatus::Failed);
+    let failed = last.filter(|last| last.status.is_failure());
     let Some(failed) = failed else {
         return Ok(None);
     };
@@ -74,7 +74,7 @@ pub(super) fn given_up(turn: Turn, mission: &Mission) -> Result<Option<Occasion>
         None => None,
     };
     Ok(Some(Occasion {
-        why: format!("{failed} failed: {}", failed.reason),
+        why: format!("{failed} {}: {}", failed.status.name(), failed.reason),
         cause: match written {
             Some(version) => Cause::find(turn.snapshot, version)?,
             None => None,

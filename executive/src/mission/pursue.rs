@@ -103,13 +103,18 @@ impl<P: Planner> Executive<P> {
                 let occasion = self.occasion(turn, &open, &why)?;
                 self.replan(turn, mission, &occasion)
             }
-            Finding::TimedOut(why) => {
-                if let Some(step) = mission.steps.iter_mut().find(|step| step.status.is_open()) {
-                    step.become_status(StepStatus::Failed, &why, now);
-                    let why = format!("{step} failed: {why}");
-                    return self.replan(turn, mission, &Occasion::new(&why));
-                }
-                Ok(())
+            Finding::TimedOut(limit) => {
+                let Some(step) = mission.steps.iter_mut().find(|step| step.status.is_open()) else {
+                    return Ok(());
+                };
+                let (status, what) = match step.status {
+                    StepStatus::Running => (StepStatus::Failed, "end"),
+                    _ => (StepStatus::Unanswered, "take"),
+                };
+                let why = format!("{} did not {what} it in {limit:.0} s", step.agent);
+                step.become_status(status, &why, now);
+                let why = format!("{step} {}: {why}", status.name());
+                self.replan(turn, mission, &Occasion::new(&why))
             }
             Finding::Shortcut { skipped, binding } => {
                 self.is_sound(turn);
@@ -249,8 +254,7 @@ fn open(mission: &Mission) -> Vec<Step> {
 
 /// Whether two plans have the same steps.
 fn same(one: &[Step], other: &[Step]) -> bool {
-    let step = |(a, b): (&Step, &Step)| a.rule == b.rule && a.binding == b.binding;
-    one.len() == other.len() && one.iter().zip(other).all(step)
+    one.len() == other.len() && one.iter().zip(other).all(|(a, b)| a.is_alike(b))
 }
 
 #[cfg(test)]

@@ -125,17 +125,20 @@ pub enum StepStatus {
     Done,
     /// Its agent could not do it, or took too long.
     Failed,
+    /// Its agent did not take it in time.
+    Unanswered,
     /// Its plan was abandoned before it was over.
     Dropped,
 }
 
 impl StepStatus {
-    const ALL: [Self; 6] = [
+    const ALL: [Self; 7] = [
         Self::Pending,
         Self::Dispatched,
         Self::Running,
         Self::Done,
         Self::Failed,
+        Self::Unanswered,
         Self::Dropped,
     ];
 
@@ -147,6 +150,7 @@ impl StepStatus {
             Self::Running => "running",
             Self::Done => "done",
             Self::Failed => "failed",
+            Self::Unanswered => "unanswered",
             Self::Dropped => "dropped",
         }
     }
@@ -154,6 +158,11 @@ impl StepStatus {
     /// Whether the step is still to be done.
     pub const fn is_open(self) -> bool {
         matches!(self, Self::Pending | Self::Dispatched | Self::Running)
+    }
+
+    /// Whether its agent did not bring it about.
+    pub const fn is_failure(self) -> bool {
+        matches!(self, Self::Failed | Self::Unanswered)
     }
 
     /// Whether an agent has it in hand.
@@ -261,6 +270,11 @@ impl Step {
             }
         }
         Ok((found, missing))
+    }
+
+    /// Whether it is the same rule at the same nodes.
+    pub(crate) fn is_alike(&self, other: &Self) -> bool {
+        self.rule == other.rule && self.binding == other.binding
     }
 
     /// Gives it another status, and says why.

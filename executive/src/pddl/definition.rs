@@ -99,3 +99,12 @@ pub struct Definition {
     /// Whether the total cost counts; else every action counts one.
     pub(super) metric: bool,
 }
+
+impl Definition {
+    /// A predicate, function or action with its arguments, as PDDL writes it.
+    pub(super) fn written(&self, name: &str, objects: &[Object]) -> String {
+        let objects = objects.iter().map(|&o| self.objects.name(o as usize));
+        let words: Vec<&str> = std::iter::once(name).chain(objects).collect();
+        format!("({})", words.join(" "))
+    }
+}

@@ -16,7 +16,9 @@ pub(super) struct Ground {
     pub(super) actions: Vec<usize>,
     /// The atom that each fact is.
     pub(super) facts: Vec<AtomId>,
-    /// An action whose cost has no value somewhere.
+    /// How many instances were left out, for their costs are no amounts.
+    pub(super) left_out: usize,
+    /// The first of them in words, and why.
     pub(super) without_cost: Option<String>,
 }
 
@@ -52,7 +54,7 @@ pub(super) fn instantiate(definition: &Definition, reached: &Reached) -> Ground 
         .iter()
         .map(|(function, objects, value)| ((*function, objects.as_slice()), *value))
         .collect();
-    let mut without_cost = None;
+    let (mut left_out, mut without_cost) = (0, None);
     let mut drafts = Vec::new();
     for (index, (number, objects)) in reached.instances.iter().enumerate() {
         let action = &definition.actions[*number];
@@ -63,7 +65,19 @@ pub(super) fn instantiate(definition: &Definition, reached: &Reached) -> Ground 
             Some(1.0)
         };
         let Some(cost) = cost.filter(|cost| *cost >= 0.0 && cost.is_finite()) else {
-            without_cost.get_or_insert_with(|| action.name.clone());
+            left_out += 1;
+            without_cost.get_or_insert_with(|| {
+                let instance = definition.written(&action.name, objects);
+                let why = match unvalued(&action.cost, &environment, &values) {
+                    Some((function, objects)) => {
+                        let function = definition.functions.name(function);
+                        let place = definition.written(function, &objects);
+                        format!("{place} has no value")
+                    }
+                    None => "its cost is less than 0, or none at all".to_owned(),
+                };
+                format!("{instance} was left out, since {why}")
+            });
             continue;
         };
         let precondition = builder.formula(&action.precondition, true, &mut environment);
@@ -102,6 +116,7 @@ pub(super) fn instantiate(definition: &Definition, reached: &Reached) -> Ground 
         ),
         actions: task::keep(which, &relevant),
         facts: builder.facts,
+        left_out,
         without_cost,
     }
 }
@@ -131,6 +146,25 @@ fn worth(
         Cost::Product(parts) => parts.iter().map(worth).product(),
         Cost::Difference(a, b) => Some(worth(a)? - worth(b)?),
         Cost::Quotient(a, b) => Some(worth(a)? / worth(b)?),
+    }
+}
+
+/// The first function of a cost that has no value, with its objects.
+fn unvalued(
+    cost: &Cost,
+    environment: &[Object],
+    values: &FxHashMap<(usize, &[Object]), f64>,
+) -> Option<(usize, Vec<Object>)> {
+    let unvalued = |part: &Cost| unvalued(part, environment, values);
+    match cost {
+        Cost::Number(_) => None,
+        Cost::Function(function, terms) => {
+            let objects: Vec<Object> = terms.iter().map(|term| term.at(environment)).collect();
+            let known = values.contains_key(&(*function, objects.as_slice()));
+            (!known).then_some((*function, objects))
+        }
+        Cost::Sum(parts) | Cost::Product(parts) => parts.iter().find_map(unvalued),
+        Cost::Difference(a, b) | Cost::Quotient(a, b) => unvalued(a).or_else(|| unvalued(b)),
     }
 }
 

@@ -136,7 +136,8 @@ fn why_unsolvable(
     let mut reasons: Vec<String> = Vec::new();
     for literal in missing.into_iter().take(4) {
         let (predicate, objects) = reached.facts.atom(ground.facts[literal.fact() as usize]);
-        let atom = written(definition, predicate, objects);
+        let predicate = definition.predicates.name(predicate);
+        let atom = definition.written(predicate, objects);
         reasons.push(if literal.negated() {
             format!("{atom} holds, and nothing takes it away")
         } else {
@@ -153,10 +154,11 @@ fn why_unsolvable(
             "no action brings about what the goal asks for".to_owned()
         });
     }
-    if let Some(action) = &ground.without_cost {
-        reasons.push(format!(
-            "the cost of action `{action}` has no value somewhere"
-        ));
+    if let Some(words) = &ground.without_cost {
+        reasons.push(words.clone());
+    }
+    if ground.left_out > 1 {
+        reasons.push(format!("so were {} other actions", ground.left_out - 1));
     }
     reasons.join("; ")
 }
@@ -183,7 +185,8 @@ fn unreached(definition: &Definition, reached: &Reached) -> Vec<String> {
                 let objects: Option<Vec<u32>> = atom.arguments.iter().map(constant).collect();
                 let Some(objects) = objects else { return };
                 if reached.facts.find(atom.predicate, &objects).is_none() {
-                    let atom = written(definition, atom.predicate, &objects);
+                    let predicate = definition.predicates.name(atom.predicate);
+                    let atom = definition.written(predicate, &objects);
                     reasons.push(format!("{atom} cannot be reached"));
                 }
             }
@@ -195,15 +198,6 @@ fn unreached(definition: &Definition, reached: &Reached) -> Vec<String> {
         walk(goal, definition, reached, &mut reasons);
     }
     reasons
-}
-
-fn written(definition: &Definition, predicate: usize, objects: &[u32]) -> String {
-    let mut text = format!("({}", definition.predicates.name(predicate));
-    for &object in objects {
-        text.push(' ');
-        text.push_str(definition.objects.name(object as usize));
-    }
-    text + ")"
 }
 
 /// A plan as the planning competitions write it: a step a line, the cost behind them. `names` are

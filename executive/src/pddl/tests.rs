@@ -139,6 +139,9 @@ fn what_no_action_brings_about_is_the_reason() {
     let planned = outcome(DELIVERY, &closed, Effort::Optimal);
     assert_eq!(planned.status, Status::Unsolvable);
     expect!["(at vase right) cannot be reached"].assert_eq(&planned.reason.unwrap());
+    let unknown = TOWN.replace("(= (length left right) 3)", "");
+    let planned = outcome(DELIVERY, &unknown, Effort::Optimal);
+    expect!["(at vase right) cannot be reached; (drive v left right) was left out, since (length left right) has no value"].assert_eq(&planned.reason.unwrap());
     let held = "(define (domain d) (:predicates (p) (q)) (:action a :parameters () :effect (q)))";
     let problem = "(define (problem x) (:domain d) (:init (p)) (:goal (and (q) (not (p)))))";
     let planned = outcome(held, problem, Effort::First);

@@ -250,7 +250,7 @@ pub fn write(
 /// What the text does not say.
 fn notes(problem: &Problem, reached: &Reached, ground: &Ground) -> Vec<String> {
     let mut notes = problem.program.notes.clone();
-    notes.extend(ground.notes.iter().cloned());
+    notes.extend(ground.unpriced.iter().map(|rule| problem.unpriced(rule)));
     let mut actions = ground.task.actions().iter();
     if actions.any(|action| action.success < 1.0) {
         let note = "rules that may fail are written with their own costs alone: what a failure \

@@ -8,7 +8,7 @@ mod novelty;
 mod present;
 
 use super::narrow::Relaxed;
-use super::{Asked, Outcome, Status, ground, raised, reason, search_in, solved};
+use super::{Asked, Outcome, Status, covers, ground, raised, reason, search_in, solved};
 use crate::ground::{
     Environment, Facts, Found, Instance, Join, Operator, Place, Problem, Scope, amount, evaluate,
     is_admitted, lacking,
@@ -86,10 +86,7 @@ pub(super) fn plan(asked: Asked<'_>, limits: &mut Limits<'_>) -> Result<Outcome,
     let raised = raised(problem, options).into_iter();
     let excluded: Vec<(usize, Environment)> = raised
         .filter(|(.., by)| by.is_infinite())
-        .map(|(operator, environment, _)| {
-            let bound = problem.program.operators[operator].bound;
-            (operator, environment[..bound].to_vec())
-        })
+        .map(|(operator, binding, _)| (operator, binding))
         .collect();
     let steps = match search(problem, &excluded, asked.awake, limits) {
         Answer::Plan(steps) => steps,
@@ -338,7 +335,7 @@ impl Search<'_, '_, '_> {
         let mut read = |place: Place| facts.value(place.at(objects)).cloned();
         let mut excluded = self.excluded.iter();
         amount(evaluate(&operator.cost, &mut read).as_ref()).is_some()
-            && !excluded.any(|(operator, at)| *operator == number && objects.starts_with(at))
+            && !excluded.any(|(operator, at)| *operator == number && covers(at, objects))
     }
 
     /// Enters the state that an instance leads to from the present one; gives it where the goal holds there.

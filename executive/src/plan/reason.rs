@@ -106,11 +106,8 @@ pub(super) fn why_unsolvable(
     }
     let truncated = reached.truncated;
     append_reservations(&mut reasons, problem, options, spares, truncated);
-    reasons.extend(
-        ground
-            .into_iter()
-            .flat_map(|ground| ground.notes.iter().cloned()),
-    );
+    let unpriced = ground.into_iter().flat_map(|ground| &ground.unpriced);
+    reasons.extend(unpriced.map(|unpriced| problem.unpriced(unpriced)));
     reasons.join("; ")
 }
 

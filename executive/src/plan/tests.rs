@@ -113,6 +113,26 @@ fn why_there_is_no_plan_names_the_rule_that_comes_nearest() {
 }
 
 #[test]
+fn a_cost_that_is_no_amount_is_told_with_its_place() {
+    let grammar = read(CARE);
+    let mut graph = ring(&grammar);
+    add(
+        &mut graph,
+        &[("room", "attic"), ("room", "loft")],
+        &[("kitchen", "connected", "attic")],
+    );
+    connect(&mut graph, "attic", "loft", -1.0);
+    let why = |to: &str| {
+        let wanted = format!("{{ \"shelly\":robot \"{to}\":room \"shelly\"->\"{to}\"(in) }}");
+        outcome(&grammar, &graph, &wanted, &Options::default())
+            .reason
+            .unwrap()
+    };
+    expect!["shelly -in-> attic cannot be reached; changeRoom(robot=shelly, room1=kitchen, room2=attic) was left out, since its cost (kitchen -connected-> attic).distance has no value; changeRoom(robot=shelly, room1=attic, room2=loft) was left out, since its cost (attic -connected-> loft).distance is -1, and costs are 0 or more (and at 1 other bindings)"].assert_eq(&why("attic"));
+    expect!["shelly -in-> loft cannot be reached; changeRoom(robot=shelly, room1=kitchen, room2=attic) was left out, since its cost (kitchen -connected-> attic).distance has no value; changeRoom(robot=shelly, room1=attic, room2=loft) was left out, since its cost (attic -connected-> loft).distance is -1, and costs are 0 or more (and at 1 other bindings)"].assert_eq(&why("loft"));
+}
+
+#[test]
 fn at_a_limit_it_says_how_far_it_came() {
     let grammar = read(CARE);
     let graph = ring(&grammar);

@@ -88,7 +88,11 @@ fn what_only_the_clock_brought_about_has_no_commit() {
     house.run(43);
     let decisions = house.decisions("go");
     let last = decisions.last().unwrap();
-    assert!(last.why.ends_with("timed out after 20 s"), "{}", last.why);
+    assert!(
+        last.why.ends_with("did not take it in 20 s"),
+        "{}",
+        last.why
+    );
     assert_eq!(last.cause, None);
 }
 
