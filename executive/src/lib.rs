@@ -21,9 +21,9 @@ pub mod task;
 mod testing;
 
 pub use mission::{
-    Cause, Config, Decision, Entry, Executive, Mission, MissionFile, MissionFileError, MissionSpec,
-    MissionStatus, MissionStep, PlannedMission, Planner, Preemption, Request, RulePlanner,
-    Schedule, StepStatus, missions, missions_with_steps, steps,
+    Cause, Config, Decision, Entry, Executive, Mission, MissionSpec, MissionStatus, MissionStep,
+    Planner, Preemption, Request, RulePlanner, Schedule, StepStatus, missions, missions_with_steps,
+    steps,
 };
 pub use plan::{Options, Outcome, Raised, Status, Step, plan};
 pub use purpose::{Purpose, obstacle, purposes};

@@ -8,7 +8,6 @@ mod attend;
 mod culprit;
 mod decision;
 mod failures;
-mod file;
 mod outcomes;
 mod pursue;
 pub(crate) mod record;
@@ -18,7 +17,6 @@ mod spec;
 mod testing;
 
 pub use decision::{Cause, Decision};
-pub use file::{MissionFile, MissionFileError, PlannedMission};
 pub use record::{
     Mission, MissionStatus, Preemption, Request, Step as MissionStep, StepStatus, missions,
     missions_with_steps, steps,

@@ -8,6 +8,7 @@ mod diagnostic;
 mod file;
 mod geometry;
 mod load;
+mod missions;
 mod people;
 mod reader;
 mod schedule;
@@ -19,6 +20,7 @@ mod value;
 pub use diagnostic::{Invalid, LoadError, Problem, ProblemKind};
 pub use file::parse_social;
 pub use load::MAIN_FILE;
+pub use missions::{Earlier, MissionFile};
 pub use schedule::parse_schedule;
 #[cfg(test)]
 pub(crate) use space::CLASSES;

@@ -3,7 +3,6 @@
 use crate::cli::Agent as Arguments;
 use crate::{Answer, Failure};
 use dsr::{AttachError, Begin, Instance, Pace, Session, Turns};
-use executive::{MissionSpec, Preemption, Schedule};
 use scenarios::{Scenario, Tracks, World};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -87,7 +86,7 @@ fn take_part(arguments: &Arguments, instance: &Instance, pace: Pace) -> Result<(
             let missions = scenario
                 .missions
                 .iter()
-                .map(|one| mission(&scenario, one))
+                .map(|one| super::mission::spec(one, scenario.start))
                 .collect();
             let Some(session) = attach()? else {
                 return Ok(());
@@ -122,28 +121,5 @@ fn attach(instance: &Instance, name: &str, stop: &AtomicBool) -> Result<Option<S
         if stop.load(Ordering::Acquire) {
             return Ok(None);
         }
-    }
-}
-
-fn mission(scenario: &Scenario, mission: &scenarios::scenario::Mission) -> MissionSpec {
-    let preemption = Preemption::ALL
-        .into_iter()
-        .find(|policy| policy.name() == mission.preemption);
-    let begins = mission.begins.unwrap_or(scenario.start);
-    let deadlines = [
-        mission.deadline.map(|deadline| scenario.start + deadline),
-        mission.within.map(|within| begins + within),
-    ];
-    MissionSpec {
-        name: mission.name.clone(),
-        goal: mission.goal.clone(),
-        priority: mission.priority,
-        deadline: deadlines.into_iter().flatten().min(),
-        preemption: preemption.unwrap_or_default(),
-        schedule: Schedule {
-            begins: mission.begins,
-            period: mission.period,
-            after: mission.after.clone(),
-        },
     }
 }

@@ -1,7 +1,7 @@
 //! Printing answers on standard output. Guarantees that colours are for terminals only.
 
 use crate::Failure;
-use dsr::{Value, json};
+use dsr::{Time, Value, json};
 use std::fmt;
 use std::io::{IsTerminal, Write};
 
@@ -72,6 +72,19 @@ pub(crate) fn brief(text: &str, most: usize) -> String {
         Some((end, _)) => format!("{} ...", &text[..end]),
         None => text.to_owned(),
     }
+}
+
+/// A time as people read it: the date and the time of day by the clock of the instance.
+pub(crate) fn clock(time: Time) -> String {
+    let moment = jiff::Timestamp::from_nanosecond(time.nanoseconds().into()).unwrap_or_default();
+    let moment = moment.to_zoned(jiff::tz::TimeZone::UTC);
+    let whole = moment.subsec_nanosecond() / 1_000_000 == 0;
+    let form = if whole {
+        "%Y-%m-%d %H:%M:%S"
+    } else {
+        "%Y-%m-%d %H:%M:%S%.3f"
+    };
+    moment.strftime(form).to_string()
 }
 
 /// A value as people read it.

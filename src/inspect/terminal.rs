@@ -5,8 +5,9 @@
 use super::frame::Frames;
 use super::look::{Looker, Source};
 use crate::Failure;
+use crate::commands::output::clock;
 use crate::view::{graph, mission};
-use dsr::NodeId;
+use dsr::{NodeId, Time};
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
 use ratatui::layout::{Constraint, Layout};
 use ratatui::style::{Color, Modifier, Style};
@@ -229,7 +230,8 @@ fn commit_line(commit: &Json) -> String {
     let rules: Vec<String> = rows(&commit["rules"]).map(text).collect();
     let time = commit["time"].as_f64().unwrap_or_default();
     let (agent, what) = (text(&commit["agent"]), text(&commit["what"]));
-    format!("{time:.2} {agent} {} {what}", rules.join(" "))
+    let time = clock(Time::from_seconds(time));
+    format!("{time} {agent} {} {what}", rules.join(" "))
 }
 
 fn node_lines(node: &Json) -> Vec<Line<'static>> {

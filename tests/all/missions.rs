@@ -53,6 +53,10 @@ fn why(instance: &str) {
         "the goal itself asks for it: {step}"
     );
 
+    let left = format!("robot-in->{}", done["binding"]["room1"].as_str().unwrap());
+    let (code, told, error) = ask(&left);
+    assert_eq!((code, &told["kind"]), (0, &"edge".into()), "{error}");
+    assert_eq!(told["removed"]["agent"], "navigation", "{told}");
     let status = format!("{}.status", done["name"].as_str().unwrap());
     let (_, told, error) = ask(&status);
     assert_eq!(told["value"], "done", "{error}");
@@ -177,11 +181,21 @@ fn the_mission_of_the_tutorial_is_carried_out_with_a_carer_at_the_terminal() {
     run.until("mission invite is running");
     let instance = run.instance_name().to_owned();
 
-    let wrong = fs::read_to_string(&round).unwrap().replace("18:00", "8 pm");
-    let wrong = file("wrong.toml", &wrong);
+    let wrong = fs::read_to_string(&round).unwrap();
+    let wrong = wrong
+        .replace("18:00", "8 pm")
+        .replace("after = \"call\"", "after = \"invit\"");
+    let wrong = file("wrong.toml", &wrong.replacen("call.aggt", "cal.aggt", 1));
     let (code, _, error) = mission(&instance, &["submit", &wrong]);
     assert_eq!(code, 2);
-    assert!(error.contains("no time of day"), "{error}");
+    for said in [
+        "3 problems",
+        "`8 pm` is not",
+        "cannot read `cal.aggt`",
+        "did you mean `invite`?",
+    ] {
+        assert!(error.contains(said), "{error}");
+    }
     let (code, _, error) = mission(&instance, &["submit", &round]);
     assert_eq!(code, 0, "{error}");
     let planned = Program::run(&["plan", &goal, "--json", "--instance", &instance]);
@@ -219,6 +233,12 @@ fn the_mission_of_the_tutorial_is_carried_out_with_a_carer_at_the_terminal() {
     let why = String::from_utf8(why.stdout).unwrap();
     assert!(why.contains("succeeded: the goal holds"), "{why}");
     assert_eq!(shown("evening_call")["status"], "queued");
+    let waits = shown("evening_call")["waits_for"][0].clone();
+    let until = waits.as_str().unwrap();
+    assert!(
+        until.starts_with("until ") && until.ends_with(" 18:00:00"),
+        "{until}"
+    );
     run.interrupt();
     run.wait_until_no_process_is_left();
 }

@@ -135,9 +135,9 @@ mod tests {
             ("drive", "hall", Unanswered),
             ("drive", "attic", Unanswered),
         ];
-        expect![[r#"
+        expect![[r"
             drives {} by 200
-            moves {} by 200"#]]
+            moves {} by 200"]]
         .assert_eq(&failures(&twice));
         let thrice = [
             &twice[..],

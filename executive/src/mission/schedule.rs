@@ -54,6 +54,59 @@ impl Mission {
         !self.status.is_over() || self.recurs()
     }
 
+    /// Whether it will not succeed any more.
+    pub fn is_hopeless(&self) -> bool {
+        let given_up = matches!(
+            self.status,
+            MissionStatus::Failed | MissionStatus::Cancelled
+        );
+        given_up && !self.recurs()
+    }
+
+    /// What became of it so far: `is running`, `has failed`.
+    pub fn outcome(&self) -> String {
+        let word = match self.status {
+            MissionStatus::Succeeded | MissionStatus::Failed => "has",
+            MissionStatus::Cancelled => "was",
+            MissionStatus::Queued | MissionStatus::Running | MissionStatus::Paused => "is",
+        };
+        format!("{word} {}", self.status.name())
+    }
+
+    /// What it waits for while it is queued, `all` being the missions there are; `clock` writes a time.
+    pub fn waits_for(
+        &self,
+        now: Time,
+        all: &[Self],
+        clock: impl Fn(Time) -> String,
+    ) -> Vec<String> {
+        if self.status != MissionStatus::Queued {
+            return Vec::new();
+        }
+        let mut waits = Vec::new();
+        if let Some(begins) = self.schedule.begins.filter(|begins| *begins > now) {
+            waits.push(format!("until {}", clock(begins)));
+        }
+        if let Some(after) = &self.schedule.after {
+            match all.iter().find(|mission| mission.name == *after) {
+                Some(other) if other.status == MissionStatus::Succeeded => {}
+                Some(other) if other.is_hopeless() => waits.push(format!(
+                    "for {after}, which {} and does not begin again",
+                    other.outcome()
+                )),
+                Some(other) => waits.push(format!("for {after}, which {}", other.outcome())),
+                None => waits.push(format!("for {after}, and there is no mission of that name")),
+            }
+        }
+        let running = |mission: &&Self| mission.status == MissionStatus::Running;
+        if waits.is_empty()
+            && let Some(other) = all.iter().find(running)
+        {
+            waits.push(format!("for the robot, which {} has", other.name));
+        }
+        waits
+    }
+
     /// Whether it is over for this time, and its next time has come.
     pub(super) fn is_due_again(&self, now: Time) -> bool {
         let done = matches!(
@@ -86,6 +139,7 @@ impl Mission {
 mod tests {
     use crate::mission::testing::{GO_TO_WARD, GREET_ANA, House};
     use crate::{Mission, MissionSpec, Preemption, Schedule};
+    use dsr::Value;
     use expect_test::expect;
 
     /// A house in which the robot shall go to the ward, by a schedule in seconds from its start.
@@ -114,10 +168,19 @@ mod tests {
         missions.into_iter().find(|m| m.name == "go").unwrap()
     }
 
+    fn waits(house: &House) -> String {
+        let missions = crate::missions(&house.graph.snapshot()).unwrap();
+        let clock = |time: dsr::Time| format!("{:.0} s", time.seconds());
+        mission(house)
+            .waits_for(house.now, &missions, clock)
+            .join(", ")
+    }
+
     #[test]
     fn a_mission_waits_for_its_time() {
         let mut house = house(Some(5.0), None, None);
         house.run(8);
+        expect!["until 1005 s"].assert_eq(&waits(&house));
         expect!["queued, 0: "].assert_eq(&house.mission("go"));
         house.run(10);
         expect!["succeeded, 0: the goal holds"].assert_eq(&house.mission("go"));
@@ -128,9 +191,27 @@ mod tests {
         let mut house = house(None, None, Some("greet"));
         house.run(4);
         expect!["queued, 0: "].assert_eq(&house.mission("go"));
+        expect!["for greet, and there is no mission of that name"].assert_eq(&waits(&house));
         house.submit("greet", GREET_ANA);
+        house.run(4);
+        expect!["for greet, which is running"].assert_eq(&waits(&house));
         house.run(20);
+        assert_eq!(waits(&house), "");
         expect!["succeeded, 0: the goal holds"].assert_eq(&house.mission("go"));
+    }
+
+    #[test]
+    fn who_waits_in_vain_or_for_the_robot_says_so() {
+        let mut vain = house(None, None, Some("greet"));
+        vain.submit("greet", GREET_ANA);
+        vain.change(|transaction| transaction.set("greet", "request", "cancel"));
+        vain.run(2);
+        expect!["for greet, which was cancelled and does not begin again"].assert_eq(&waits(&vain));
+        let mut second = house(None, None, None);
+        second.submit("greet", GREET_ANA);
+        second.change(|transaction| transaction.set("greet", "priority", Value::I64(2)));
+        second.run(3);
+        expect!["for the robot, which greet has"].assert_eq(&waits(&second));
     }
 
     #[test]

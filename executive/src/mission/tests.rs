@@ -203,11 +203,11 @@ fn a_silent_agent_is_noticed_by_its_deadline_and_in_the_end_given_up() {
     house.agent = Agent::Silent;
     // `changeRoom` expects 5 s, so it is given 20 s.
     house.run(43);
-    expect![[r#"
+    expect![[r"
         go/1/0 changeRoom(shelly, hall, kitchen) unanswered: navigation did not take it in 20 s
         go/1/1 changeRoom(shelly, kitchen, ward) dropped: changeRoom(robot=shelly, room1=hall, room2=kitchen) unanswered: navigation did not take it in 20 s
         go/2/2 changeRoom(shelly, hall, kitchen) dispatched
-        go/2/3 changeRoom(shelly, kitchen, ward) pending"#]].assert_eq(&house.steps());
+        go/2/3 changeRoom(shelly, kitchen, ward) pending"]].assert_eq(&house.steps());
     house.run(300);
     expect!["failed, 2: no plan: shelly -in-> ward cannot be reached; steps that failed lately were left out; agent navigation did not take 3 steps, the last of them changeRoom(robot=shelly, room1=hall, room2=kitchen)"].assert_eq(&house.mission("go"));
     assert_eq!(house.turn(), 0);

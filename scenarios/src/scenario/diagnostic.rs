@@ -221,6 +221,22 @@ pub enum ProblemKind {
         /// What is wrong with it.
         message: &'static str,
     },
+    /// A mission that can begin only after its own success.
+    #[error("mission `{mission}` waits for itself{}{}", if .by.is_empty() { "" } else { ", by way of " }, .by.join(" and "))]
+    WaitsForItself {
+        /// The mission.
+        mission: String,
+        /// Those between it and itself.
+        by: Vec<String>,
+    },
+    /// A mission that waits for one that will not succeed.
+    #[error("mission `{mission}` {outcome}, and does not begin again")]
+    WaitsInVain {
+        /// The mission that is waited for.
+        mission: String,
+        /// What became of it.
+        outcome: String,
+    },
     /// Neither a time nor a date with a time.
     #[error("`{text}` is not {expected}")]
     NotATime {

@@ -3,9 +3,8 @@
 
 use super::diagnostic::{Invalid, Problem, ProblemKind};
 use super::reader::{Bound, Located, Problems, Table};
-use super::value::{DAY, Period, Preemption};
-use super::{Mission, Scenario, TracksFrame};
-use super::{devices, people, schedule, space};
+use super::{Scenario, TracksFrame};
+use super::{devices, missions, people, schedule, space};
 use agents::human_observer;
 use agents::names::suggest;
 use agents::social_mapping::SocialConfig;
@@ -173,10 +172,10 @@ pub(super) fn point(table: &Table<'_>, key: &'static str) -> Point2<f64> {
     Point2::new(x, y)
 }
 
-/// The day that a time is of, as if it were UTC.
-pub(super) fn date(time: Time) -> Date {
+/// The civil time that a time is, as if it were UTC.
+pub(super) fn moment(time: Time) -> DateTime {
     let moment = Timestamp::from_nanosecond(time.nanoseconds().into()).unwrap_or_default();
-    moment.to_zoned(TimeZone::UTC).date()
+    moment.to_zoned(TimeZone::UTC).datetime()
 }
 
 /// The text as TOML; all that is wrong with its syntax otherwise.
@@ -262,7 +261,7 @@ fn whole(table: &Table<'_>, text: &str, read: Read<'_>) -> Scenario {
     let people = people::people(table, &mut names, &scene);
     let streams = people::streams(table, &mut names, &rooms);
     let activities = schedule::activities(table, &mut names, begin.date());
-    let missions = missions(table, &mut names, begin, read);
+    let missions = missions::missions(table, &mut names, begin, &[], read);
     let rules = file(table, "rules", "rules.aggl", read);
     let tracks = tracks(table);
     let social = social(table, Some(bounds));
@@ -294,7 +293,7 @@ fn whole(table: &Table<'_>, text: &str, read: Read<'_>) -> Scenario {
 }
 
 /// The text of a file that the key (or else the default) names.
-fn file(table: &Table<'_>, key: &'static str, default: &str, read: Read<'_>) -> String {
+pub(super) fn file(table: &Table<'_>, key: &'static str, default: &str, read: Read<'_>) -> String {
     let path = table
         .get::<String>(key)
         .map_or_else(|| default.to_owned(), |path| path.value);
@@ -305,70 +304,6 @@ fn file(table: &Table<'_>, key: &'static str, default: &str, read: Read<'_>) -> 
         };
         table.problems.add(kind, table.span_of(key));
         String::new()
-    })
-}
-
-fn missions(
-    scenario: &Table<'_>,
-    names: &mut Names<'_>,
-    begin: DateTime,
-    read: Read<'_>,
-) -> Vec<Mission> {
-    let mut missions = Vec::new();
-    let mut waits = Vec::new();
-    for table in scenario.tables("mission") {
-        let name = names.take(&table, Kind::Other);
-        let path = table.require::<String>("goal");
-        let goal = path
-            .as_ref()
-            .map(|path| file(&table, "goal", &path.value, read));
-        let priority = table.get("priority").map_or(0, |priority| priority.value);
-        let deadline = table.get::<f64>("deadline").map(|deadline| deadline.value);
-        let preemption = table.get::<Preemption>("preemption");
-        let preemption = preemption.map_or(Preemption::default(), |policy| policy.value);
-        let period = table.get::<Period>("every").map(|period| period.value.0);
-        let within = table
-            .has("within")
-            .then(|| table.number("within", Bound::Positive, 1.0));
-        let at = table.moment::<ClockTime>("at");
-        let begins = match at {
-            Some(at) => next(begin, at),
-            // Periods are counted from its first beginning.
-            None => period.and_then(|_| time(begin)),
-        };
-        let after = table.get::<String>("after");
-        waits.extend(after.clone());
-        if let (Some(name), Some(path), Some(goal)) = (name, path, goal) {
-            missions.push(Mission {
-                name,
-                file: path.value,
-                goal,
-                priority,
-                deadline,
-                preemption: preemption.0,
-                begins,
-                period,
-                within,
-                after: after.map(|after| after.value),
-            });
-        }
-        table.close();
-    }
-    for after in waits {
-        if !missions.iter().any(|mission| mission.name == after.value) {
-            names.unknown(scenario.problems, "mission", &[Kind::Other], &after);
-        }
-    }
-    missions
-}
-
-/// The first time after `begin`, or at it, that a clock shows `at`.
-fn next(begin: DateTime, at: ClockTime) -> Option<Time> {
-    let today = time_of_day(begin.date(), at)?;
-    Some(if today < time(begin)? {
-        today + DAY
-    } else {
-        today
     })
 }
 

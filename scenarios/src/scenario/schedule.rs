@@ -3,7 +3,7 @@
 //! returns ends after it starts.
 
 use super::diagnostic::{Invalid, Problem, ProblemKind};
-use super::file::{Kind, Names, date, document, time_of_day};
+use super::file::{Kind, Names, document, moment, time_of_day};
 use super::reader::{Problems, Table};
 use super::{Activity, Scenario};
 use dsr::Time;
@@ -18,7 +18,7 @@ use std::cmp::Ordering;
 pub fn parse_schedule(file: &str, text: &str, day: Time) -> Result<Vec<Activity>, Box<Invalid>> {
     let mut names = Names::new(text);
     names.accept_objects();
-    whole(text, &mut names, date(day))
+    whole(text, &mut names, moment(day).date())
         .map_err(|problems| Box::new(Invalid::new(file, text, problems)))
 }
 
@@ -41,7 +41,7 @@ pub(super) fn extend(scenario: &mut Scenario, file: &str, text: &str) -> Result<
     ];
     let others = others.into_iter().flatten().map(|name| (name, Kind::Other));
     names.take_elsewhere(objects.chain(others));
-    let activities = whole(text, &mut names, date(scenario.start))
+    let activities = whole(text, &mut names, moment(scenario.start).date())
         .map_err(|problems| Box::new(Invalid::new(file, text, problems)))?;
     scenario.activities.extend(activities);
     Ok(())

@@ -4,7 +4,7 @@
 use super::path::{Path, Thing};
 use super::source::{Source, name_of};
 use crate::cli::GraphSource;
-use crate::commands::output::{Table, brief, dim, print, print_json, value_text};
+use crate::commands::output::{Table, brief, clock, dim, print, print_json, value_text};
 use crate::{Answer, Failure};
 use dsr::{Attribute, AttributeId, ReadError, Snapshot, Time, Value, Version, json};
 use serde_json::{Value as Json, json};
@@ -34,7 +34,11 @@ fn entries(
     path: &str,
     limit: Option<usize>,
 ) -> Result<(Vec<Entry>, String), Failure> {
-    let (found, name) = locate(newest, path)?;
+    let (found, gone) = Path::find_kept(newest, path)?;
+    let name = match gone {
+        None => found.thing.describe(newest),
+        Some(last) => format!("{} (gone)", found.thing.describe(&last)),
+    };
     let entries = match &found.attribute {
         None => of_thing(newest, found.thing),
         Some(attribute) => {
@@ -71,11 +75,11 @@ pub(super) fn history(
     let oldest = newest.oldest();
     let (entries, name) = entries(&newest, path, limit)?;
     let oldest_time = oldest_time(&newest);
-    let mut table = Table::new(&["version", "time/s", "agent", "rule", "value"]);
+    let mut table = Table::new(&["version", "time", "agent", "rule", "value"]);
     for entry in &entries {
         table.row([
             entry.version.to_string(),
-            format!("{:.3}", entry.time),
+            clock(Time::from_seconds(entry.time)),
             entry.agent.clone(),
             entry.rules.join(", "),
             brief(&entry.text, 80),
@@ -88,27 +92,6 @@ pub(super) fn history(
     );
     print(&format!("{}\n{table}", dim(&kept)))?;
     Ok(Answer::Yes)
-}
-
-/// What a path names now or, where it is gone, named in a version that is kept.
-fn locate(newest: &Snapshot, path: &str) -> Result<(Path, String), Failure> {
-    let missing = match Path::find(newest, path) {
-        Ok(found) => {
-            let name = found.thing.describe(newest);
-            return Ok((found, name));
-        }
-        Err(missing) => missing,
-    };
-    for version in (newest.oldest().0..newest.version().0).rev() {
-        let Ok(snapshot) = newest.at(Version(version)) else {
-            break;
-        };
-        if let Ok(found) = Path::find(&snapshot, path) {
-            let name = found.thing.describe(&snapshot);
-            return Ok((found, format!("{name} (gone)")));
-        }
-    }
-    Err(missing)
 }
 
 fn entry(snapshot: &Snapshot, text: String, value: Json) -> Result<Entry, ReadError> {

@@ -14,7 +14,7 @@ mod watch;
 mod write;
 
 pub(crate) use history::rows as history_rows;
-pub(super) use path::{Path, Thing};
+pub(super) use path::{Path, Thing, last_with};
 pub(crate) use source::{Source, attach, name_of, no_such, read_graph};
 pub(crate) use write::transaction as setting;
 

@@ -3,7 +3,7 @@
 
 use super::source::{find_node, name_of, no_such, node_ref};
 use crate::Failure;
-use dsr::{Attribute, AttributeId, EdgeKey, EdgeRef, NodeId, Owner, ReadError, Snapshot};
+use dsr::{Attribute, AttributeId, EdgeKey, EdgeRef, NodeId, Owner, ReadError, Snapshot, Version};
 
 /// A node or an edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -107,6 +107,20 @@ impl Path {
         }
     }
 
+    /// What a path names now or, where it is gone, named in a version that is kept: the newest such.
+    pub(in crate::commands) fn find_kept(
+        newest: &Snapshot,
+        path: &str,
+    ) -> Result<(Self, Option<Snapshot>), Failure> {
+        let missing = match Self::find(newest, path) {
+            Ok(found) => return Ok((found, None)),
+            Err(missing) => missing,
+        };
+        let find = |version: &Snapshot| Self::find(version, path).ok();
+        let (found, last) = last_with(newest, find).ok_or(missing)?;
+        Ok((found, Some(last)))
+    }
+
     /// As [`Self::find`], of an attribute.
     pub(super) fn find_attribute(
         snapshot: &Snapshot,
@@ -121,6 +135,16 @@ impl Path {
         })?;
         Ok((found.thing, attribute))
     }
+}
+
+/// What the newest of the versions before this one that are kept has, and that version.
+pub(in crate::commands) fn last_with<T>(
+    newest: &Snapshot,
+    has: impl Fn(&Snapshot) -> Option<T>,
+) -> Option<(T, Snapshot)> {
+    let before = (newest.oldest().0..newest.version().0).rev();
+    let mut kept = before.map_while(|version| newest.at(Version(version)).ok());
+    kept.find_map(|version| Some((has(&version)?, version)))
 }
 
 fn edge(snapshot: &Snapshot, path: &str, start: &str, to: &str) -> Result<Path, Failure> {

@@ -2,7 +2,7 @@
 
 use super::source::{attach, find_node, no_such};
 use crate::cli::{GraphSource, Watch};
-use crate::commands::output::{bold, brief, dim, green, print, red, tell, value_text};
+use crate::commands::output::{bold, brief, clock, dim, green, print, red, tell, value_text};
 use crate::seen::Seen;
 use crate::{Answer, Failure};
 use dsr::{Attribute, Change, Filter, NodeId, Snapshot, Touch, Update};
@@ -137,6 +137,6 @@ fn line(seen: &Seen, change: &Change) -> String {
         let text = format!("{from} -{label}-> {to}{}", values(set));
         parts.push(mark(touched.touch, text));
     }
-    let heading = format!("{} {:.3} s", change.version, change.time.seconds());
+    let heading = format!("{} {}", change.version, clock(change.time));
     format!("{} {}: {}", dim(&heading), change.agent, parts.join("; "))
 }

@@ -5,7 +5,7 @@
 mod written;
 
 use super::graph::{Path, Thing, attach};
-use super::output::{print, print_json};
+use super::output::{clock, print, print_json};
 use crate::cli::Why as Arguments;
 use crate::{Answer, Failure};
 use dsr::{ReadError, Snapshot, Time};
@@ -93,10 +93,12 @@ fn tell(snapshot: &Snapshot, what: Option<&str>) -> Result<Told, Untold> {
             return known.step(mission, step);
         }
     }
-    let Path { thing, attribute } = Path::find(snapshot, what).map_err(Untold::Said)?;
-    match attribute {
-        Some(attribute) => known.attribute(thing, &attribute),
-        None => known.thing(thing),
+    let (Path { thing, attribute }, gone) =
+        Path::find_kept(snapshot, what).map_err(Untold::Said)?;
+    match (gone, attribute) {
+        (Some(last), _) => known.gone(thing, &last),
+        (None, Some(attribute)) => known.attribute(thing, &attribute),
+        (None, None) => known.thing(thing),
     }
 }
 
@@ -108,7 +110,7 @@ fn decision(decision: &Decision) -> String {
         why,
         cause,
     } = decision;
-    let mut line = format!("{}  {what}", Time::from_seconds(*time));
+    let mut line = format!("{}  {what}", clock(Time::from_seconds(*time)));
     if !why.is_empty() {
         let _ = write!(line, ": {why}");
     }
@@ -165,6 +167,10 @@ impl Known<'_> {
             let _ = write!(text, ": {}", mission.reason);
         }
         text.push('\n');
+        let waits = mission.waits_for(self.snapshot.time(), &self.missions, clock);
+        for waits in &waits {
+            let _ = writeln!(text, "  waits {waits}");
+        }
         let decisions = mission.decisions();
         for one in &decisions {
             let _ = writeln!(text, "  {}", decision(one));
@@ -194,7 +200,7 @@ impl Known<'_> {
             json: json!({
                 "kind": "mission", "mission": mission.name, "status": status,
                 "reason": mission.reason, "goal": mission.goal, "lacks": lacks,
-                "decisions": decisions, "next": in_hand,
+                "waits_for": waits, "decisions": decisions, "next": in_hand,
             }),
         })
     }

@@ -3,12 +3,28 @@
 
 use super::{Known, Told, Untold};
 use crate::Failure;
-use crate::commands::graph::Thing;
-use crate::commands::output::value_text;
+use crate::commands::graph::{Thing, last_with};
+use crate::commands::output::{clock, value_text};
 use dsr::{ReadError, Snapshot, Time, Value as Content, Version, json as encoding};
 use executive::{Cause, Mission, MissionStep};
 use serde_json::{Value, json};
 use std::fmt::{self, Write as _};
+
+/// What a commit did to something.
+#[derive(Clone, Copy)]
+enum Did {
+    Write,
+    Remove,
+}
+
+impl Did {
+    const fn word(self) -> &'static str {
+        match self {
+            Self::Write => "written",
+            Self::Remove => "removed",
+        }
+    }
+}
 
 /// A commit as far as it is on record.
 pub(super) struct Written {
@@ -21,13 +37,20 @@ pub(super) struct Written {
 
 impl fmt::Display for Written {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (time, agent, version) = (self.time, &self.agent, self.version);
+        let (time, agent, version) = (clock(self.time), &self.agent, self.version);
         write!(f, "at {time} by {agent}, version {version}")?;
         match self.rules.as_deref() {
             None => f.write_str(", which is not kept any more: its rules are not known"),
             Some([]) => f.write_str(", by no rule"),
             Some(rules) => write!(f, ", by {}", rules.join(", ")),
         }
+    }
+}
+
+fn kind(thing: Thing) -> &'static str {
+    match thing {
+        Thing::Edge(_) => "edge",
+        Thing::Node(_) => "node",
     }
 }
 
@@ -118,15 +141,18 @@ impl Known<'_> {
     }
 
     /// Tells a commit and the step that it was made for.
-    fn made(&self, what: &str, written: Option<&Written>) -> Result<(String, Value), Untold> {
+    fn made(
+        &self,
+        what: &str,
+        did: Did,
+        written: Option<&Written>,
+    ) -> Result<(String, Value), Untold> {
+        let did = did.word();
         let Some(written) = written else {
-            let text = format!("{what}\n  the commit that made it is not kept any more\n");
-            return Ok((
-                text,
-                json!({ "written": null, "step": null, "mission": null }),
-            ));
+            let text = format!("{what}\n  {did} by a commit that is not kept any more\n");
+            return Ok((text, json!({ did: null, "step": null, "mission": null })));
         };
-        let mut text = format!("{what}\n  written {written}\n");
+        let mut text = format!("{what}\n  {did} {written}\n");
         let step = self.step_of(written)?;
         if let Some((mission, step)) = step {
             let _ = writeln!(
@@ -136,7 +162,7 @@ impl Known<'_> {
             );
         }
         let json = json!({
-            "written": written.json(), "step": step.map(|(_, step)| &step.name),
+            did: written.json(), "step": step.map(|(_, step)| &step.name),
             "mission": step.map(|(mission, _)| &mission.name),
         });
         Ok((text, json))
@@ -148,42 +174,69 @@ impl Known<'_> {
         let known = self.snapshot.schema().attribute_id(name);
         known.map_err(|error| Untold::Said(Failure::input(error)))?;
         let Some((value, written)) = Written::of_attribute(self.snapshot, thing, name)? else {
-            let text = format!("{path} has no value: nobody has written it, or it was removed\n");
-            return Ok(Told {
-                text,
-                json: json!({
-                    "kind": "attribute", "path": path, "value": null, "written": null,
-                    "step": null, "mission": null,
-                }),
-            });
+            let has = |version: &Snapshot| {
+                let id = version.schema().find_attribute(name)?;
+                thing.attribute(version, id).ok().flatten()
+            };
+            let (text, mut json) = match last_with(self.snapshot, has) {
+                Some((_, last)) => self.removed(&format!("{path} has no value"), &last)?,
+                None => {
+                    let oldest = self.snapshot.oldest();
+                    let text =
+                        format!("{path} has no value, and had none since version {oldest}\n");
+                    (
+                        text,
+                        json!({ "written": null, "step": null, "mission": null }),
+                    )
+                }
+            };
+            json["kind"] = json!("attribute");
+            json["path"] = json!(path);
+            json["value"] = Value::Null;
+            return Ok(Told { text, json });
         };
         let what = format!("{path} = {}", value_text(&value));
-        let (text, mut json) = self.made(&what, Some(&written))?;
+        let (text, mut json) = self.made(&what, Did::Write, Some(&written))?;
         json["kind"] = json!("attribute");
         json["path"] = json!(path);
         json["value"] = encoding::value_to_json(&value);
         Ok(Told { text, json })
     }
 
+    /// Tells what took something away that the version `last` had, and the next had not.
+    fn removed(&self, what: &str, last: &Snapshot) -> Result<(String, Value), Untold> {
+        let written = Written::of_version(self.snapshot, Version(last.version().0 + 1))?;
+        self.made(what, Did::Remove, written.as_ref())
+    }
+
+    /// Why an edge or a node is not there any more, which the version `last` was the last to have.
+    pub(super) fn gone(&self, thing: Thing, last: &Snapshot) -> Result<Told, Untold> {
+        let name = thing.describe(last);
+        let (text, mut json) = self.removed(&format!("{name} is gone"), last)?;
+        json["kind"] = json!(kind(thing));
+        json["path"] = json!(name);
+        Ok(Told { text, json })
+    }
+
     /// Why an edge or a node is there.
     pub(super) fn thing(&self, thing: Thing) -> Result<Told, Untold> {
         let name = thing.describe(self.snapshot);
-        let (kind, version) = match thing {
+        let version = match thing {
             Thing::Edge(key) => {
                 let edge = self.snapshot.find_edge(key)?;
-                ("edge", edge.map(|edge| edge.version()).transpose()?)
+                edge.map(|edge| edge.version()).transpose()?
             }
             Thing::Node(id) => {
                 let node = self.snapshot.find_node(id)?;
-                ("node", node.map(|node| node.version()).transpose()?)
+                node.map(|node| node.version()).transpose()?
             }
         };
         let written = match version {
             Some(version) => Written::of_version(self.snapshot, version)?,
             None => None,
         };
-        let (text, mut json) = self.made(&name, written.as_ref())?;
-        json["kind"] = json!(kind);
+        let (text, mut json) = self.made(&name, Did::Write, written.as_ref())?;
+        json["kind"] = json!(kind(thing));
         json["path"] = json!(name);
         Ok(Told { text, json })
     }

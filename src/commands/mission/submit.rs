@@ -1,0 +1,167 @@
+//! `cortex mission submit`: a goal, or the missions of a file, become nodes of the graph. It guarantees
+//! that all of a file is submitted or nothing, and that all that is wrong with it is told at once.
+
+use super::{commit, wait};
+use crate::cli::SubmitMission;
+use crate::commands::output::{print, print_json};
+use crate::commands::{read_grammar, read_text};
+use crate::{Answer, Failure};
+use dsr::{Session, Snapshot, Time, Transaction};
+use executive::{MissionSpec, Preemption, Schedule};
+use grammar::{Defects, Diagnostic, SourceFile};
+use scenarios::scenario::{Earlier, Mission, MissionFile};
+use serde_json::json;
+use std::path::Path;
+
+pub(super) fn run(
+    session: &mut Session,
+    submit: &SubmitMission,
+    machine: bool,
+) -> Result<Answer, Failure> {
+    let several = submit.file.extension().is_some_and(|end| end == "toml");
+    if several && (submit.name.is_some() || submit.wait) {
+        return Err(Failure::input_with_help(
+            "a mission file has several missions with names of their own",
+            "leave out --name and --wait",
+        ));
+    }
+    let snapshot = session.snapshot().map_err(Failure::internal)?;
+    let mut transaction = Transaction::new();
+    let specs = if several {
+        of_file(&snapshot, &submit.file, &mut transaction)?
+    } else {
+        vec![of_goal(&snapshot, submit)?]
+    };
+    for spec in &specs {
+        let taken = snapshot.find_node_by_name(&spec.name);
+        if taken.map_err(Failure::internal)?.is_some() {
+            return Err(Failure::input_with_help(
+                format!("there is already a node `{}`", spec.name),
+                "give the mission another name with --name, or in its file",
+            ));
+        }
+        transaction.create_node("mission", &spec.name, spec.attributes());
+    }
+    commit(session, &transaction, snapshot.time())?;
+    if let [spec] = &specs[..]
+        && submit.wait
+    {
+        return wait(session, &spec.name, machine);
+    }
+    let queued = |spec: &MissionSpec| json!({ "name": spec.name, "status": "queued" });
+    if !machine {
+        let lines = specs
+            .iter()
+            .map(|s| format!("mission {} is queued\n", s.name));
+        print(&lines.collect::<String>())?;
+    } else if several {
+        print_json(&specs.iter().map(queued).collect())?;
+    } else {
+        print_json(&specs.iter().map(queued).next().unwrap_or_default())?;
+    }
+    Ok(Answer::Yes)
+}
+
+/// The mission that the flags describe.
+fn of_goal(snapshot: &Snapshot, submit: &SubmitMission) -> Result<MissionSpec, Failure> {
+    let goal = read_text(&submit.file)?;
+    let stem = submit.file.file_stem().map(|stem| stem.to_string_lossy());
+    let name = submit.name.clone().or(stem.map(Into::into));
+    let name = name.ok_or_else(|| Failure::input("give the mission a --name"))?;
+    check_goal(&goal, &submit.file.display().to_string(), snapshot)?;
+    let policy = |policy: &Preemption| policy.name() == submit.preemption;
+    let preemption = Preemption::ALL.into_iter().find(policy);
+    Ok(MissionSpec {
+        name,
+        goal,
+        priority: submit.priority,
+        deadline: submit.deadline.map(|seconds| snapshot.time() + seconds),
+        preemption: preemption.unwrap_or_default(),
+        schedule: Schedule::default(),
+    })
+}
+
+/// The missions of a file; what puts its rules in force becomes a part of the transaction.
+fn of_file(
+    snapshot: &Snapshot,
+    path: &Path,
+    transaction: &mut Transaction,
+) -> Result<Vec<MissionSpec>, Failure> {
+    let now = snapshot.time();
+    let earlier = executive::missions(snapshot).map_err(Failure::internal)?;
+    let earlier = earlier.into_iter().map(|mission| Earlier {
+        hopeless: mission.is_hopeless().then(|| mission.outcome()),
+        name: mission.name,
+    });
+    let earlier: Vec<Earlier> = earlier.collect();
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let name = path.display().to_string();
+    let read = |name: &str| std::fs::read_to_string(folder.join(name));
+    let file = MissionFile::parse(&name, &read_text(path)?, now, &earlier, &read)
+        .map_err(|invalid| Failure::Input((*invalid).into()))?;
+    let mut diagnostics = Vec::new();
+    if let Some((rules, text)) = &file.rules {
+        let (grammar, defects) = read_grammar(text, &folder.join(rules));
+        diagnostics.extend(defects);
+        diagnostics.extend(grammar.check_schema(snapshot.schema()));
+        if !grammar::has_errors(&diagnostics) {
+            *transaction = grammar.publish(snapshot).map_err(Failure::internal)?;
+        }
+    }
+    for mission in &file.missions {
+        let path = folder.join(&mission.file).display().to_string();
+        diagnostics.extend(goal_defects(&mission.goal, &path, snapshot));
+    }
+    if grammar::has_errors(&diagnostics) {
+        return Err(Failure::Input(Defects { diagnostics }.into()));
+    }
+    Ok(file.missions.iter().map(|one| spec(one, now)).collect())
+}
+
+/// A mission of a scenario or of a mission file, whose deadlines count from `start`.
+pub(crate) fn spec(mission: &Mission, start: Time) -> MissionSpec {
+    let preemption = Preemption::ALL
+        .into_iter()
+        .find(|policy| policy.name() == mission.preemption);
+    let begins = mission.begins.unwrap_or(start);
+    let deadlines = [
+        mission.deadline.map(|deadline| start + deadline),
+        mission.within.map(|within| begins + within),
+    ];
+    MissionSpec {
+        name: mission.name.clone(),
+        goal: mission.goal.clone(),
+        priority: mission.priority,
+        deadline: deadlines.into_iter().flatten().min(),
+        preemption: preemption.unwrap_or_default(),
+        schedule: Schedule {
+            begins: mission.begins,
+            period: mission.period,
+            after: mission.after.clone(),
+        },
+    }
+}
+
+/// Whether the goal can be read, and says nothing that the graph's schema does not know.
+pub(crate) fn check_goal(goal: &str, file: &str, snapshot: &Snapshot) -> Result<(), Failure> {
+    let diagnostics = goal_defects(goal, file, snapshot);
+    if grammar::has_errors(&diagnostics) {
+        return Err(Failure::Input(Defects { diagnostics }.into()));
+    }
+    Ok(())
+}
+
+/// All that is wrong with a goal.
+fn goal_defects(goal: &str, file: &str, snapshot: &Snapshot) -> Vec<Diagnostic> {
+    let grammar = grammar::Grammar {
+        types: grammar::Types::of_schema(snapshot.schema()),
+        ..grammar::Grammar::default()
+    };
+    match grammar::parse_goal(goal, file, &grammar.types) {
+        Ok(parsed) => {
+            let source = SourceFile::new(file, goal);
+            grammar.check_goal_schema(&parsed, &source, snapshot.schema())
+        }
+        Err(defects) => defects.diagnostics,
+    }
+}
