@@ -51,6 +51,17 @@ impl Progress {
             bar.set_message(format!("{now:5.1} s of at most {end:.0} s  {what}"));
         }
     }
+
+    /// So many of `all` are done, of which this was one: on a terminal a bar, elsewhere a line for each tenth.
+    pub(crate) fn count(&self, done: usize, all: usize, what: &str) {
+        if let Some(bar) = &self.bar {
+            bar.set_length(all.max(1) as u64);
+            bar.set_position(done as u64);
+            bar.set_message(format!("{done} of {all}  {what}"));
+        } else if done * 10 / all.max(1) > (done - 1) * 10 / all.max(1) {
+            self.say(&format!("{done} of {all}"));
+        }
+    }
 }
 
 impl Drop for Progress {

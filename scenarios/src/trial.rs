@@ -5,17 +5,25 @@
 //! People and objects are known as they are, so that a trial shows what planning and control do (TD
 //! section 6.1); the laser and the localisation have the scenario's noise.
 
+mod plain;
+mod social_force;
+
+pub use plain::Method;
+
 use crate::metrics::mapped;
 use crate::scenario::Scenario;
+use crate::tracks::Tracks;
 use crate::world::{Inputs as WorldInputs, Truth, World};
 use agents::navigation::control::Limits;
 use agents::navigation::map_age::MapState;
-use agents::navigation::navigator::{Config, Inputs, Navigator, Status};
+use agents::navigation::navigator::{Config, Inputs, Navigator, Output, Status};
 use agents::navigation::people::Person;
 use agents::navigation::target::{Company, Target, Task};
 use agents::social_mapping::scene::{Activity, Manner, Person as MappedPerson, SceneError};
 use agents::social_mapping::{ConfigError, SocialMapper, SocialScene};
+use dsr::Time;
 use nalgebra::Isometry2;
+use plain::Plain;
 
 /// From one turn of everything to the next, s.
 const STEP: f64 = 0.1;
@@ -29,7 +37,11 @@ pub struct Trial<'a> {
     pub scenario: &'a Scenario,
     /// What its noise grows from.
     pub seed: u64,
-    /// Whether people and objects are more than obstacles.
+    /// Recorded pedestrians who take the place of the scenario's.
+    pub tracks: Option<&'a Tracks>,
+    /// How the robot finds its way.
+    pub method: Method,
+    /// Whether people and objects are more than obstacles; only to our navigation.
     pub social: bool,
     /// What the robot is to get to, one after the other.
     pub targets: Vec<Target>,
@@ -66,6 +78,36 @@ pub enum TrialError {
     Scene(#[from] SceneError),
 }
 
+/// Whatever drives the robot.
+enum Driver {
+    Navigation(Box<Navigator>),
+    Plain(Box<Plain>),
+}
+
+impl Driver {
+    fn new(method: Method, config: Config) -> Self {
+        match method {
+            Method::Navigation => Self::Navigation(Box::new(Navigator::new(config))),
+            Method::AStar => Self::Plain(Box::new(Plain::new(false, config))),
+            Method::SocialForce => Self::Plain(Box::new(Plain::new(true, config))),
+        }
+    }
+
+    fn step(&mut self, now: Time, inputs: &Inputs) -> Output {
+        match self {
+            Self::Navigation(navigator) => navigator.step(now, inputs),
+            Self::Plain(plain) => plain.step(now, inputs),
+        }
+    }
+
+    fn plans(&self) -> u64 {
+        match self {
+            Self::Navigation(navigator) => navigator.plans(),
+            Self::Plain(plain) => plain.plans(),
+        }
+    }
+}
+
 impl Trial<'_> {
     /// Drives until the robot is there or the scenario's time is up.
     ///
@@ -73,11 +115,11 @@ impl Trial<'_> {
     /// [`TrialError`] where there is no social map of the scenario.
     pub fn drive(&self) -> Result<Drive, TrialError> {
         let scenario = self.scenario;
-        let mut world = World::new(scenario, self.seed, None);
+        let mut world = World::new(scenario, self.seed, self.tracks.cloned());
         let mut mapper = SocialMapper::new(scenario.social.clone())
             .map_err(|problems| TrialError::Config { problems })?;
         let mut scene = self.scene();
-        let mut navigator = Navigator::new(self.navigation);
+        let mut driver = Driver::new(self.method, self.navigation);
         let robot = &scenario.robot;
         let limits = Limits {
             radius: robot.radius,
@@ -112,14 +154,16 @@ impl Trial<'_> {
                 if step as f64 * STEP >= self.agenda_from && scene.activities.is_empty() {
                     scene.activities = self.agenda();
                 }
+                // The social forces are all that there is of people in that model.
                 let people = truth.people.iter();
+                let people = people.filter(|_| self.method != Method::SocialForce);
                 scene.people = people.map(|body| mapped_person(body, target)).collect();
                 grid = Some(mapper.update(truth.time, &scene)?.grid);
             }
             let people: Vec<Person> = truth.people.iter().map(known_person).collect();
             let now = truth.time;
             samples.push(truth);
-            let output = navigator.step(
+            let output = driver.step(
                 now,
                 &Inputs {
                     odometry: odometry.as_ref(),
@@ -130,7 +174,7 @@ impl Trial<'_> {
                     people: &people,
                     task: Some(&task),
                     limits,
-                    social: self.social,
+                    social: self.is_social(),
                 },
             );
             command = Some(output.command);
@@ -144,8 +188,12 @@ impl Trial<'_> {
             samples,
             arrived: legs.len() == self.targets.len(),
             legs,
-            plans: navigator.plans(),
+            plans: driver.plans(),
         })
+    }
+
+    fn is_social(&self) -> bool {
+        self.social && self.method == Method::Navigation
     }
 
     fn agenda(&self) -> Vec<Activity> {
@@ -164,7 +212,7 @@ impl Trial<'_> {
             bounds: self.scenario.bounds,
             walls: self.scenario.walls.clone(),
             robot_radius: self.scenario.robot.radius,
-            social: self.social,
+            social: self.is_social(),
             objects: self.scenario.objects.iter().map(mapped).collect(),
             ..SocialScene::default()
         }
@@ -217,6 +265,8 @@ mod tests {
         let trial = Trial {
             scenario: &scenario,
             seed: 3,
+            tracks: None,
+            method: Method::Navigation,
             social: true,
             targets: vec![Target::Point(Point2::new(4.0, 6.0))],
             navigation: Config::default(),
@@ -227,5 +277,51 @@ mod tests {
         let last = drive.samples.last().unwrap().world_from_robot;
         assert!((last.translation.vector - Vector2::new(4.0, 6.0)).norm() < 0.3);
         assert_eq!(trial.drive().unwrap(), drive);
+    }
+
+    #[test]
+    fn the_other_methods_get_there_too_and_touch_nothing() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("corridor");
+        let scenario = Scenario::load(&folder).unwrap();
+        for method in [Method::AStar, Method::SocialForce] {
+            let trial = Trial {
+                scenario: &scenario,
+                seed: 1,
+                tracks: None,
+                method,
+                social: false,
+                targets: vec![Target::Point(Point2::new(13.2, 1.5))],
+                navigation: Config::default(),
+                agenda_from: 0.0,
+            };
+            let drive = trial.drive().unwrap();
+            assert!(drive.arrived, "{method:?}");
+            let last = drive.samples.last().unwrap();
+            assert_eq!(last.collisions.total(), 0, "{method:?}");
+        }
+    }
+
+    #[test]
+    fn recorded_pedestrians_take_the_place_of_the_scenarios() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("plaza");
+        let mut scenario = Scenario::load(&folder).unwrap();
+        scenario.duration = 5.0;
+        let line = |k: u32| format!("{} 7 {} 2.0\n", k * 10, 0.2 * f64::from(k));
+        let text = (0..40).map(line).collect::<Vec<_>>().concat();
+        let tracks = Tracks::parse("recorded", &text).unwrap();
+        let trial = Trial {
+            scenario: &scenario,
+            seed: 1,
+            tracks: Some(&tracks),
+            method: Method::AStar,
+            social: false,
+            targets: vec![Target::Point(Point2::new(13.0, 8.0))],
+            navigation: Config::default(),
+            agenda_from: 0.0,
+        };
+        let drive = trial.drive().unwrap();
+        let all = drive.samples.iter().flat_map(|sample| &sample.people);
+        let names: std::collections::BTreeSet<&str> = all.map(|body| body.name.as_str()).collect();
+        assert_eq!(names.into_iter().collect::<Vec<_>>(), ["person_7"]);
     }
 }

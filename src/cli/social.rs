@@ -119,7 +119,8 @@ pub(crate) struct Experiment {
     /// How often to repeat what chance plays a part in
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=1000))]
     pub(crate) seeds: u64,
-    /// For `perception`: recorded pedestrians (`obsmat.txt`, or frame id x y) in place of simulated ones
+    /// For `perception`: recorded pedestrians (`obsmat.txt`, or frame id x y) in place of simulated ones; for
+    /// `compare`: one more world with them
     #[arg(long, value_name = "FILE")]
     pub(crate) tracks: Option<PathBuf>,
     /// For `tg-shapes` and `tg-groups`: write the figures as ours are to this folder (.svg and .png)

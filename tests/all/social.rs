@@ -374,6 +374,7 @@ fn every_experiment_listed_runs() {
         "td-gains",
         "ap-table1",
         "ap-escort",
+        "compare",
         "fd-table1",
         "fd-table5",
         "tg-shapes",
@@ -398,6 +399,38 @@ fn two_who_pass() -> String {
         format!("{frame} 1 {x:.3} 0.0\n{frame} 2 {back:.3} 3.0\n")
     };
     (0..=500).step_by(10).map(line).collect()
+}
+
+#[test]
+fn ways_of_driving_are_held_against_each_other_also_among_recorded_people() {
+    let folder = tempfile::tempdir().unwrap();
+    let tracks = save(&folder, "tracks.txt", &two_who_pass());
+    let arguments = ["experiment", "compare", "--seeds", "1", "--json"];
+    let (code, out, err) = cortex(&[&arguments[..], &["--tracks", &tracks]].concat());
+    assert_eq!(code, 0, "{err}");
+    assert!(err.contains("of 35"), "no progress: {err}");
+    let comparison: Value = serde_json::from_str(&out).unwrap();
+    let worlds = comparison["worlds"].as_array().unwrap();
+    assert_eq!(worlds.last().unwrap()["world"], "recorded");
+    let mean = |world: &Value, method: &str, figure: &str| {
+        let mean = &world["methods"][method][figure]["mean"];
+        mean.as_f64().unwrap()
+    };
+    let mut kept_out = 0;
+    for world in worlds {
+        for method in comparison["methods"].as_array().unwrap() {
+            let method = method.as_str().unwrap();
+            assert!(mean(world, method, "duration") > 1.0, "{world}");
+        }
+        assert!(mean(world, "cortex", "success") > 99.0, "{world}");
+        let personal = |method| mean(world, method, "psi_personal");
+        assert!(personal("cortex") <= personal("a_star"), "{world}");
+        kept_out += i32::from(personal("cortex") < personal("a_star"));
+    }
+    assert!(
+        kept_out >= 3,
+        "A* is in nobody's space either: {comparison}"
+    );
 }
 
 #[test]

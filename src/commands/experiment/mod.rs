@@ -1,6 +1,7 @@
 //! `cortex experiment`: the papers' tables and figures, ours beside what is printed. This module owns
 //! the list of those there are, and guarantees that every one listed runs.
 
+mod compare;
 mod drawn;
 mod drives;
 mod flexible_density;
@@ -11,6 +12,7 @@ mod table;
 
 use super::output::{print, print_json};
 use crate::cli::Experiment as Arguments;
+use crate::progress::Progress;
 use crate::{Answer, Failure};
 use serde_json::json;
 use std::fmt::Write as _;
@@ -106,6 +108,14 @@ const EXPERIMENTS: &[Experiment] = &[
         about: "escorting somebody through a door (AP Fig. 9)",
         run: drives::escort,
     },
+    Experiment {
+        name: compare::NAME,
+        about: "other ways of driving in the same worlds: A*, social force, no social map, AP's zones",
+        run: |seeds| {
+            let progress = Progress::new(compare::NAME, true);
+            Ok(compare::compare(seeds, None, &progress)?.table())
+        },
+    },
 ];
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
@@ -125,6 +135,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
             return Err(Failure::input_with_help(what, help));
         }
     };
+    if experiment.name == compare::NAME {
+        return hold_against_others(arguments, experiment.about);
+    }
     let table = match &arguments.tracks {
         None => (experiment.run)(arguments.seeds)?,
         Some(tracks) if experiment.name == perception::NAME => {
@@ -132,7 +145,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
         }
         Some(_) => {
             let what = format!("`{}` knows no recorded tracks", experiment.name);
-            let help = format!("`--tracks` is for `{}`", perception::NAME);
+            let help = format!(
+                "`--tracks` is for `{}` and `{}`",
+                perception::NAME,
+                compare::NAME
+            );
             return Err(Failure::input_with_help(what, help));
         }
     };
@@ -149,6 +166,20 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
             let _ = writeln!(text, "\npictures: {}", pictures.join(", "));
         }
         print(&text)?;
+    }
+    Ok(Answer::Yes)
+}
+
+/// The comparison, which takes minutes: it shows how far it is.
+fn hold_against_others(arguments: &Arguments, about: &str) -> Result<Answer, Failure> {
+    let progress = Progress::new(compare::NAME, false);
+    let tracks = arguments.tracks.as_deref();
+    let comparison = compare::compare(arguments.seeds, tracks, &progress)?;
+    drop(progress);
+    if arguments.json {
+        print_json(&comparison.json(about))?;
+    } else {
+        print(&comparison.table().text(compare::NAME, about))?;
     }
     Ok(Answer::Yes)
 }

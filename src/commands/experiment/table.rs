@@ -197,7 +197,13 @@ impl Table {
                 cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
             })
             .collect();
-        let mut text = format!("{name}: {about}\nours | printed, ! where they differ\n\n");
+        let mut cells = self.rows.iter().flat_map(|row| &row.cells);
+        let key = if cells.any(|cell| cell.printed.is_some()) {
+            "ours | printed, ! where they differ\n"
+        } else {
+            ""
+        };
+        let mut text = format!("{name}: {about}\n{key}\n");
         for (index, line) in lines.iter().enumerate() {
             let mut cells = line
                 .iter()

@@ -12,7 +12,7 @@ use agents::social_mapping::{CooperationZone, SocialConfig};
 use nalgebra::{Isometry2, Point2};
 use scenarios::Scenario;
 use scenarios::metrics::path_length;
-use scenarios::trial::{Drive, Trial};
+use scenarios::trial::{Drive, Method, Trial};
 use scenarios::world::Truth;
 use std::f64::consts::{PI, TAU};
 
@@ -84,6 +84,8 @@ fn drive(
     let trial = Trial {
         scenario,
         seed,
+        tracks: None,
+        method: Method::Navigation,
         social,
         targets,
         navigation: Config {

@@ -11,7 +11,7 @@ use agents::navigation::target::Target;
 use nalgebra::Point2;
 use scenarios::Scenario;
 use scenarios::metrics::measure;
-use scenarios::trial::Trial;
+use scenarios::trial::{Method, Trial};
 
 /// The values tried of both gains: `k_c` in metres, `k_r` in metres per metre (READING.md item 12).
 const VALUES: [f64; 5] = [0.02, 0.04, 0.06, 0.09, 0.13];
@@ -76,6 +76,8 @@ impl Course {
         let trial = Trial {
             scenario: &self.scenario,
             seed: target as u64 + 1,
+            tracks: None,
+            method: Method::Navigation,
             social: false,
             targets: vec![Target::Point(self.targets[target])],
             navigation: Config {

@@ -7,7 +7,7 @@ use agents::navigation::navigator::Config;
 use agents::navigation::target::Target;
 use nalgebra::Point2;
 use scenarios::metrics::{measure, object_spaces};
-use scenarios::trial::Trial;
+use scenarios::trial::{Method, Trial};
 
 /// The part of a printed length within which ours counts as the same.
 const LENGTH: f64 = 0.03;
@@ -69,6 +69,8 @@ fn figures(printed: &Printed, way: &Way, seed: u64) -> Result<(bool, u64, Vec<f6
     let trial = Trial {
         scenario: &scenario,
         seed,
+        tracks: None,
+        method: Method::Navigation,
         social: way.social,
         targets: vec![Target::Point(Point2::new(printed.goal.0, printed.goal.1))],
         navigation: Config::default(),
