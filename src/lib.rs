@@ -69,9 +69,9 @@ pub fn main() -> ExitCode {
     }
 }
 
-#[allow(clippy::print_stderr, reason = "this is where errors reach the user")]
+/// Where nobody reads the error (`2>&1 | head`), the exit code still tells.
 fn print_error(report: &miette::Report) {
-    eprintln!("{report:?}");
+    commands::output::tell(&format!("{report:?}\n"));
 }
 
 /// Why a verb did not end with an answer.

@@ -1,6 +1,7 @@
 //! What a long verb shows while it works: a bar on a terminal, lines elsewhere; always on standard
 //! error, so that standard output holds only the answer.
 
+use crate::commands::output::tell;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 
@@ -31,14 +32,10 @@ impl Progress {
     }
 
     /// Something happened that is worth a line.
-    #[allow(
-        clippy::print_stderr,
-        reason = "progress is for the person at the terminal"
-    )]
     pub(crate) fn say(&self, line: &str) {
         match &self.bar {
             Some(bar) => bar.println(format!("{}: {line}", self.title)),
-            None if !self.quiet => eprintln!("{}: {line}", self.title),
+            None if !self.quiet => tell(&format!("{}: {line}\n", self.title)),
             None => {}
         }
     }

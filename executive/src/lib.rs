@@ -22,8 +22,8 @@ mod testing;
 
 pub use mission::{
     Cause, Config, Decision, Entry, Executive, Mission, MissionSpec, MissionStatus, MissionStep,
-    Planner, Preemption, Request, RulePlanner, Schedule, StepStatus, missions, missions_with_steps,
-    steps,
+    Planner, Preemption, Request, RulePlanner, Schedule, StepStatus, learned, missions,
+    missions_with_steps, steps,
 };
 pub use plan::{Options, Outcome, Raised, Status, Step, plan};
 pub use purpose::{Purpose, obstacle, purposes};

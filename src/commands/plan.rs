@@ -130,11 +130,12 @@ fn of_instance(name: &str) -> Result<(Grammar, Snapshot), Failure> {
             "load some with `cortex rules load`",
         )
     })?;
-    let grammar = published.read(snapshot.schema());
-    Ok((
-        grammar.map_err(|defects| Failure::Input(defects.into()))?,
-        snapshot,
-    ))
+    let grammar = published
+        .read(snapshot.schema())
+        .map_err(|defects| Failure::Input(defects.into()))?;
+    // As the executive would plan for a new mission.
+    let learned = executive::learned(&grammar, &snapshot).map_err(Failure::internal)?;
+    Ok((learned.into_owned(), snapshot))
 }
 
 fn write_file(path: &Path, text: &str) -> Result<(), Failure> {

@@ -37,7 +37,17 @@ impl<P: Planner> Executive<P> {
                 self.log(now, what, mission.reason.clone());
             }
             if late && !mission.status.is_over() {
-                self.finish(now, mission, MissionStatus::Failed, "its deadline passed");
+                let open = mission.steps.iter().find(|step| step.status.is_open());
+                let why = match open {
+                    Some(step) => {
+                        format!(
+                            "its deadline passed while {step} was {}",
+                            step.status.name()
+                        )
+                    }
+                    None => "its deadline passed".to_owned(),
+                };
+                self.finish(now, mission, MissionStatus::Failed, &why);
             }
             write(&before, mission);
         }

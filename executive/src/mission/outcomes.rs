@@ -14,7 +14,10 @@ const MISSIONS: usize = 20;
 
 /// The grammar with the success of each rule as the steps in the graph bear it out, and with costs
 /// by which a rule that fails more often than it says has to be tried more often.
-pub(super) fn learned<'a>(
+///
+/// # Errors
+/// [`ReadError`].
+pub fn learned<'a>(
     grammar: &'a Grammar,
     snapshot: &Snapshot,
 ) -> Result<Cow<'a, Grammar>, ReadError> {

@@ -180,6 +180,12 @@ fn everything_that_is_wrong_is_told_at_its_place() {
         p.pddl:3:21: a condition on numbers is not supported
         p.pddl:4:4: a metric other than `minimize (total-cost)` is not supported"]]
     .assert_eq(&refusal(domain, problem));
+    // Of a problem that is not closed nothing is known, of its domain all.
+    let told = refusal(domain, "(define (problem p) (:domain d");
+    assert!(
+        told.starts_with("p.pddl") && told.contains("d.pddl"),
+        "{told}"
+    );
 }
 
 #[test]

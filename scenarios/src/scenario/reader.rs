@@ -89,7 +89,7 @@ impl<'a> Table<'a> {
     }
 
     fn find(&self, key: &'static str) -> Option<&'a Spanned<DeValue<'a>>> {
-        self.asked.borrow_mut().push(key);
+        self.allow(key);
         self.entries.get(key)
     }
 
@@ -132,12 +132,15 @@ impl<'a> Table<'a> {
 
     /// Lets `key` stand without reading it.
     pub(super) fn allow(&self, key: &'static str) {
-        self.asked.borrow_mut().push(key);
+        let mut asked = self.asked.borrow_mut();
+        if !asked.contains(&key) {
+            asked.push(key);
+        }
     }
 
     /// Notes that `key` is not there.
     pub(super) fn missing(&self, key: &'static str) {
-        self.asked.borrow_mut().push(key);
+        self.allow(key);
         let kind = ProblemKind::MissingKey {
             key: key.to_owned(),
             table: self.title.clone(),

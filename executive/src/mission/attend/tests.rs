@@ -57,7 +57,7 @@ fn a_mission_fails_at_its_deadline_and_the_earlier_one_goes_first() {
     expect!["queued, 0: "].assert_eq(&house.mission("go"));
     expect!["running, 0: "].assert_eq(&house.mission("greet"));
     house.run(6);
-    expect!["failed, 0: its deadline passed"].assert_eq(&house.mission("greet"));
+    expect!["failed, 0: its deadline passed while changeRoom(robot=shelly, room1=hall, room2=kitchen) was running"].assert_eq(&house.mission("greet"));
     expect!["running, 0: "].assert_eq(&house.mission("go"));
 }
 

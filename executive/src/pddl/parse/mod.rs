@@ -70,17 +70,21 @@ pub(super) fn read(domain: &SourceFile, problem: &SourceFile) -> Result<Definiti
     let problem_sections = problem_text
         .as_ref()
         .map(|text| reader.sections(text, "problem"));
-    if let (Some(of_domain), Some(of_problem)) = (domain_sections, problem_sections) {
+    if let Some(of_domain) = domain_sections {
         reader.file = domain;
         reader.declarations(&of_domain);
-        reader.file = problem;
-        reader.objects_of(&of_problem);
-        reader.file = domain;
+        if let Some(of_problem) = &problem_sections {
+            reader.file = problem;
+            reader.objects_of(of_problem);
+            reader.file = domain;
+        }
         for section in of_domain.all(":action") {
             reader.action(section);
         }
-        reader.file = problem;
-        reader.problem(&of_domain, &of_problem);
+        if let Some(of_problem) = &problem_sections {
+            reader.file = problem;
+            reader.problem(&of_domain, of_problem);
+        }
     }
     let definition = reader.definition;
     if defects.is_empty() {
