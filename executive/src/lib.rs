@@ -27,4 +27,4 @@ pub use mission::{
 };
 pub use plan::{Options, Outcome, Raised, Status, Step, plan};
 pub use purpose::{Purpose, obstacle, purposes};
-pub use search::{Answer, Effort, Limits, Reachability, StopReason, search};
+pub use search::{Answer, Effort, Limits, Milestones, Reachability, StopReason, search};

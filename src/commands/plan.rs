@@ -6,7 +6,7 @@ use crate::cli::Plan as Arguments;
 use crate::{Answer, Failure};
 use dsr::{Graph, Image, Schema, Snapshot};
 use executive::pddl::{self, WriteError, Written};
-use executive::{Effort, Limits, Options, Outcome, Status, plan};
+use executive::{Effort, Limits, Milestones, Options, Outcome, Status, plan};
 use grammar::live::Published;
 use grammar::{Grammar, SourceFile};
 use serde_json::json;
@@ -48,7 +48,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     }
     if arguments.json {
         let mut answer = json!(outcome);
+        let Milestones {
+            grounded,
+            first_plan,
+        } = limits.milestones();
         answer["seconds"] = json!(seconds);
+        answer["grounded"] = json!(grounded);
+        answer["first_plan"] = json!(first_plan);
         print_json(&answer)?;
     } else {
         print(&told(&outcome, seconds))?;

@@ -89,7 +89,10 @@ pub(super) fn plan(asked: Asked<'_>, limits: &mut Limits<'_>) -> Result<Outcome,
         .map(|(operator, binding, _)| (operator, binding))
         .collect();
     let steps = match search(problem, &excluded, asked.awake, limits) {
-        Answer::Plan(steps) => steps,
+        Answer::Plan(steps) => {
+            limits.note_plan();
+            steps
+        }
         Answer::Nothing => {
             let reason = reason::why_no_order(problem, options, limits.expanded());
             let unsolvable = Status::Unsolvable;

@@ -25,6 +25,16 @@ pub struct Limits<'a> {
     cap: u64,
     /// The state with the least estimate so far, and that estimate.
     nearest: Option<(Micro, State)>,
+    milestones: Milestones,
+}
+
+/// When planning came how far, in seconds by the clock of its [`Limits`]; without one nothing is known.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Milestones {
+    /// The actions were made, and the search began.
+    pub grounded: Option<f64>,
+    /// There was a plan, to be made better from then on.
+    pub first_plan: Option<f64>,
 }
 
 impl fmt::Debug for Limits<'_> {
@@ -76,6 +86,7 @@ impl<'a> Limits<'a> {
             expanded: 0,
             cap: u64::MAX,
             nearest: None,
+            milestones: Milestones::default(),
         }
     }
 
@@ -105,6 +116,25 @@ impl<'a> Limits<'a> {
     /// How many states were expanded under these limits so far.
     pub fn expanded(&self) -> u64 {
         self.expanded
+    }
+
+    /// When planning under these limits came how far.
+    pub fn milestones(&self) -> Milestones {
+        self.milestones
+    }
+
+    /// Notes that a search begins, if it is the first.
+    pub(crate) fn note_grounded(&mut self) {
+        if self.milestones.grounded.is_none() {
+            self.milestones.grounded = self.clock.as_mut().map(|elapsed| elapsed());
+        }
+    }
+
+    /// Notes that there is a plan, if it is the first.
+    pub(crate) fn note_plan(&mut self) {
+        if self.milestones.first_plan.is_none() {
+            self.milestones.first_plan = self.clock.as_mut().map(|elapsed| elapsed());
+        }
     }
 
     /// Notes an estimate of how far a state is from the goal.

@@ -13,7 +13,7 @@ mod relaxed;
 mod states;
 mod windows;
 
-pub use limits::{Limits, StopReason};
+pub use limits::{Limits, Milestones, StopReason};
 
 use crate::task::{Literal, Micro, Task};
 use ff::Ff;
@@ -90,6 +90,7 @@ impl Reachability {
 /// assert_eq!(answer, Answer::Solved { actions: vec![0], cost: 2_000_000, optimal: true });
 /// ```
 pub fn search(task: &Task, effort: Effort, limits: &mut Limits<'_>) -> Answer {
+    limits.note_grounded();
     let relaxed = Relaxed::new(task);
     limits.forget_nearest();
     if let Err(reason) = limits.check_time() {
@@ -99,7 +100,10 @@ pub fn search(task: &Task, effort: Effort, limits: &mut Limits<'_>) -> Answer {
     if effort == Effort::Optimal {
         let mut heuristic = LandmarkCut::new(&relaxed, costs().collect());
         return match astar::search(task, &mut heuristic, limits) {
-            Found::Plan(actions) => solved(task, actions, true),
+            Found::Plan(actions) => {
+                limits.note_plan();
+                solved(task, actions, true)
+            }
             Found::Nothing => Answer::Unsolvable,
             Found::Stopped(reason) => Answer::Stopped(reason),
         };
@@ -119,6 +123,7 @@ pub fn search(task: &Task, effort: Effort, limits: &mut Limits<'_>) -> Answer {
         Found::Nothing => return Answer::Unsolvable,
         Found::Stopped(reason) => return Answer::Stopped(reason),
     };
+    limits.note_plan();
     best = without_needless(task, best);
     // One unit is added to each cost, so that free actions do not make a way look short.
     let by_cost: Vec<Micro> = costs().map(|c| c.saturating_add(1_000_000)).collect();
