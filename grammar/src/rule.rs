@@ -4,6 +4,7 @@
 //! again is equal to the one before.
 
 use crate::Name;
+use std::collections::BTreeMap;
 
 /// Who brings a rule about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -90,6 +91,38 @@ impl Pattern {
     /// The link `from -> to (label)`, negated or not.
     pub fn edge(&self, from: &str, label: &str, to: &str) -> Option<&PatternEdge> {
         self.edges.iter().find(|edge| edge.joins(from, label, to))
+    }
+
+    /// To look up more than one of its nodes or links.
+    pub(crate) fn index(&self) -> PatternIndex<'_> {
+        let mut index = PatternIndex::default();
+        for node in &self.nodes {
+            index.nodes.entry(&node.variable).or_insert(node);
+        }
+        for edge in &self.edges {
+            let key = (&*edge.from, &*edge.label, &*edge.to);
+            index.edges.entry(key).or_insert(edge);
+        }
+        index
+    }
+}
+
+/// The nodes and links of a pattern by their names.
+#[derive(Debug, Default)]
+pub(crate) struct PatternIndex<'p> {
+    nodes: BTreeMap<&'p str, &'p PatternNode>,
+    edges: BTreeMap<(&'p str, &'p str, &'p str), &'p PatternEdge>,
+}
+
+impl<'p> PatternIndex<'p> {
+    /// As [`Pattern::node`].
+    pub(crate) fn node(&self, variable: &str) -> Option<&'p PatternNode> {
+        self.nodes.get(variable).copied()
+    }
+
+    /// As [`Pattern::edge`].
+    pub(crate) fn edge(&self, from: &str, label: &str, to: &str) -> Option<&'p PatternEdge> {
+        self.edges.get(&(from, label, to)).copied()
     }
 }
 

@@ -97,14 +97,16 @@ impl Grammar {
                 }
             }
         }
-        dependent.retain(|region| !broken.contains(region));
-        dependent.sort_unstable();
-        dependent.dedup();
         broken.sort_unstable();
         broken.dedup();
+        dependent.retain(|region| broken.binary_search(region).is_err());
+        dependent.sort_unstable();
+        dependent.dedup();
         let unusable = |name: &Name| {
             let region = self.region(name.span());
-            region.is_some_and(|region| broken.contains(&region) || dependent.contains(&region))
+            region.is_some_and(|region| {
+                broken.binary_search(&region).is_ok() || dependent.binary_search(&region).is_ok()
+            })
         };
         let names = |regions: &[usize]| {
             let parts = regions.iter().map(|&region| &self.regions[region].of);
@@ -145,12 +147,11 @@ impl Grammar {
 
     /// The part of its file that a place is in.
     fn region(&self, place: Span) -> Option<usize> {
-        let regions = self.regions.iter().enumerate();
-        let before = regions.filter(|(_, region)| {
-            region.start.file == place.file && region.start.start <= place.start
-        });
-        let last = before.max_by_key(|(_, region)| region.start.start)?;
-        Some(last.0)
+        // They lie in the order of the files and of their lines.
+        let before =
+            |region: &Region| (region.start.file, region.start.start) <= (place.file, place.start);
+        let last = self.regions.partition_point(before).checked_sub(1)?;
+        (self.regions[last].start.file == place.file).then_some(last)
     }
 }
 

@@ -5,21 +5,32 @@
 use super::at;
 use crate::matching::conjuncts;
 use crate::parser::Finding;
+use crate::rule::PatternIndex;
 use crate::{AttributePath, Condition, Effect, Name, Problem, Rule};
+use std::collections::BTreeSet;
 
 type Link<'r> = (&'r Name, &'r Name, &'r Name);
 
-/// Links that are there after the rule.
-#[derive(Clone)]
-struct Known<'r> {
-    links: Vec<Link<'r>>,
-    /// Those of the right side.
-    wanted: Vec<Link<'r>>,
-    /// Those that it takes away.
-    gone: Vec<Link<'r>>,
+/// Links that are there after the rule, and those that it takes away, as one list of effects says beside what stands
+/// around it.
+#[derive(Default)]
+struct Known<'k, 'r> {
+    around: Option<&'k Known<'k, 'r>>,
+    links: BTreeSet<Link<'r>>,
+    gone: BTreeSet<Link<'r>>,
 }
 
-impl<'r> Known<'r> {
+impl<'r> Known<'_, 'r> {
+    /// Whether the link is there afterwards, if that is known.
+    fn stays(&self, link: &Link<'r>) -> Option<bool> {
+        let layers = std::iter::successors(Some(self), |known| known.around);
+        let mut known = layers.filter_map(|layer| {
+            let is_gone = layer.gone.contains(link);
+            (is_gone || layer.links.contains(link)).then_some(!is_gone)
+        });
+        known.next()
+    }
+
     /// What a condition that holds before the rule says of the links after it.
     fn ask(&mut self, condition: &'r Condition) {
         for part in conjuncts(condition) {
@@ -37,8 +48,8 @@ impl<'r> Known<'r> {
     }
 
     fn add(&mut self, link: Link<'r>) {
-        if !self.gone.contains(&link) {
-            self.links.push(link);
+        if self.stays(&link).is_none() {
+            self.links.insert(link);
         }
     }
 
@@ -51,26 +62,37 @@ impl<'r> Known<'r> {
         }
     }
 
-    fn effects(&self, effects: &'r [Effect], findings: &mut Vec<Finding>) {
-        let mut known = self.clone();
-        let unlinked = effects.iter().filter_map(|effect| match effect {
-            Effect::Unlink { label, from, to } => Some((from, label, to)),
-            _ => None,
-        });
-        // What the right side wants is there whatever effects say.
-        known
-            .gone
-            .extend(unlinked.filter(|link| !self.wanted.contains(link)));
+    fn inside(&self) -> Known<'_, 'r> {
+        Known {
+            around: Some(self),
+            ..Known::default()
+        }
+    }
+
+    fn effects(&mut self, right: &PatternIndex, effects: &'r [Effect], found: &mut Vec<Finding>) {
         for effect in effects {
             match effect {
                 Effect::Link { label, from, to } => {
-                    known.gone.retain(|gone| *gone != (from, label, to));
-                    known.links.push((from, label, to));
+                    self.links.insert((from, label, to));
+                }
+                // What the right side wants is there whatever effects say.
+                Effect::Unlink { label, from, to }
+                    if right.edge(from, label, to).is_none_or(|edge| edge.negated) =>
+                {
+                    self.gone.insert((from, label, to));
+                }
+                _ => {}
+            }
+        }
+        for effect in effects {
+            match effect {
+                Effect::Link { label, from, to } => {
+                    self.gone.remove(&(from, label, to));
                 }
                 // A value that is not there would keep the rule from being applied.
                 Effect::Assign { value, .. } => {
                     for path in value.paths() {
-                        known.add_path(path);
+                        self.add_path(path);
                     }
                 }
                 _ => {}
@@ -78,12 +100,12 @@ impl<'r> Known<'r> {
         }
         for effect in effects {
             match effect {
-                Effect::Assign { target, .. } => known.assigned(target, findings),
-                Effect::Forall { body, .. } => known.effects(body, findings),
+                Effect::Assign { target, .. } => self.assigned(target, found),
+                Effect::Forall { body, .. } => self.inside().effects(right, body, found),
                 Effect::When { condition, body } => {
-                    let mut inner = known.clone();
+                    let mut inner = self.inside();
                     inner.ask(condition);
-                    inner.effects(body, findings);
+                    inner.effects(right, body, found);
                 }
                 _ => {}
             }
@@ -96,37 +118,30 @@ impl<'r> Known<'r> {
         } = target
         {
             let link = format!("{from}->{to}({label})");
-            if self.gone.contains(&(from, label, to)) {
-                findings.push(at(label, Problem::LinkTaken { link }));
-            } else if !self.links.contains(&(from, label, to)) {
-                findings.push(at(label, Problem::MaybeNoLink { link }));
-            }
+            let problem = match self.stays(&(from, label, to)) {
+                Some(true) => return,
+                Some(false) => Problem::LinkTaken { link },
+                None => Problem::MaybeNoLink { link },
+            };
+            findings.push(at(label, problem));
         }
     }
 }
 
-/// Reports what is assigned to links that the rule neither makes nor asks for.
+/// Reports what is assigned to links that the rule neither makes nor asks for, or takes away.
 pub(super) fn links(rule: &Rule, findings: &mut Vec<Finding>) {
-    let (left, right) = (&rule.left.edges, &rule.right.edges);
-    let stays = |from, label, to| rule.right.edge(from, label, to).is_some_and(|e| !e.negated);
-    let goes = left.iter().chain(right).filter(|edge| {
-        let starred = rule.right.edge(&edge.from, &edge.label, &edge.to);
-        starred.is_some_and(|edge| edge.negated)
-            || !edge.negated && !stays(&edge.from, &edge.label, &edge.to)
-    });
-    let wanted = right.iter().filter(|edge| !edge.negated);
-    let wanted: Vec<Link<'_>> = wanted
-        .map(|edge| (&edge.from, &edge.label, &edge.to))
-        .collect();
-    let mut known = Known {
-        links: wanted.clone(),
-        wanted,
-        gone: goes
-            .map(|edge| (&edge.from, &edge.label, &edge.to))
-            .collect(),
-    };
-    rule.precondition
-        .iter()
-        .for_each(|condition| known.ask(condition));
-    known.effects(&rule.effect, findings);
+    let right = rule.right.index();
+    let mut known = Known::default();
+    for edge in rule.left.edges.iter().chain(&rule.right.edges) {
+        let link = (&edge.from, &edge.label, &edge.to);
+        match right.edge(&edge.from, &edge.label, &edge.to) {
+            Some(after) if !after.negated => known.links.insert(link),
+            None if edge.negated => continue,
+            _ => known.gone.insert(link),
+        };
+    }
+    for condition in rule.precondition.as_slice() {
+        known.ask(condition);
+    }
+    known.inside().effects(&right, &rule.effect, findings);
 }

@@ -210,6 +210,24 @@ fn ranges_and_kinds_of_the_schema_are_held_against_every_part_of_a_condition() {
 }
 
 #[test]
+fn a_conflict_over_nodes_that_come_or_go_tells_which_rule_makes_them() {
+    let text = "name=x
+===
+lay : active(1) { { h:hen } => { h:hen e:egg e->e(raw) } }
+count : active(1) { { h:hen h->h(up) } => { h:hen h->h(up) } precondition { (forall e:egg (seen e e)) } }
+flee : active(1) { { h:hen h->h(up) } => { } }
+";
+    let found = read(text).conflicts(None, crate::EFFORT_LIMIT).found;
+    check(
+        found.into_iter().map(|found| found.diagnostic).collect(),
+        &expect![[r#"
+            test.aggl:3:1: note: `lay` can disable `count` (for e (egg_1): e (egg_1) has no link `seen` to e (egg_1), where `lay` makes egg_1) where there are h:hen h->h(up)
+            test.aggl:5:1: note: `flee` can disable `lay` (`flee` deletes h) where there are h:hen h->h(up)
+            test.aggl:5:1: note: `flee` can disable `count` (`flee` deletes h) where there are h:hen h->h(up)"#]],
+    );
+}
+
+#[test]
 fn links_and_values_that_no_schema_allows_are_told() {
     let schema = r#"
         [types]

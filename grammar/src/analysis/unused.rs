@@ -138,10 +138,11 @@ pub(super) fn variables(rule: &Rule, findings: &mut Vec<Finding>) {
         uses.condition(condition, findings);
     }
     uses.effects(&rule.effect, findings);
+    let (left, right) = (rule.left.index(), rule.right.index());
     for node in rule.bound_nodes() {
-        let kept = match rule.right.node(&node.variable) {
+        let kept = match right.node(&node.variable) {
             Some(after) => after.type_name == node.type_name,
-            None => rule.left.node(&node.variable).is_none(),
+            None => left.node(&node.variable).is_none(),
         };
         if kept && !uses.0.contains(&node.variable) {
             findings.push(at(&node.variable, unused(node)));

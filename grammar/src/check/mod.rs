@@ -9,7 +9,7 @@ mod schema;
 mod scope;
 
 use crate::parser::{Action, Broken, Finding};
-use crate::{Goal, Grammar, Name, Pattern, PatternNode, Problem, Rule, Types};
+use crate::{Goal, Grammar, Name, Pattern, PatternEdge, PatternNode, Problem, Rule, Types};
 use dsr::suggest;
 use scope::Scope;
 use std::collections::{BTreeMap, BTreeSet};
@@ -56,7 +56,9 @@ fn rule_names(grammar: &Grammar, broken: &[Broken]) -> Vec<Name> {
     let rules = grammar.rules.iter().map(|rule| &rule.name);
     let combos = grammar.combos.iter().map(|combo| &combo.name);
     let broken = broken.iter().filter_map(|broken| broken.name.as_ref());
-    rules.chain(combos).chain(broken).cloned().collect()
+    let mut names: Vec<Name> = rules.chain(combos).chain(broken).cloned().collect();
+    names.sort_by(|a, b| (a, a.span()).cmp(&(b, b.span())));
+    names
 }
 
 /// Checks a goal against types (any type goes if there are none). Words in `lost` parts of it
@@ -82,7 +84,7 @@ pub(crate) fn check_goal(goal: &Goal, types: &Types, lost: &[Name]) -> Vec<Findi
 struct Check<'a> {
     types: &'a Types,
     missing: bool,
-    /// Of all rules and combos, broken ones included.
+    /// Of all rules and combos, broken ones included; in their order as texts.
     rules: Vec<Name>,
     /// What was told to be in no file that could be read, each name once.
     not_read: BTreeSet<(&'static str, Name)>,
@@ -188,13 +190,13 @@ impl Check<'_> {
     }
 
     fn distinct_rules(&mut self) {
-        let mut names = self.rules.clone();
-        names.sort_by(|a, b| (a, a.span()).cmp(&(b, b.span())));
+        let names = std::mem::take(&mut self.rules);
         for pair in names.windows(2) {
             if pair[0] == pair[1] {
                 self.duplicate("rule", &pair[0], &pair[1]);
             }
         }
+        self.rules = names;
     }
 
     fn activates(&mut self, rule: &Rule) {
@@ -204,7 +206,7 @@ impl Check<'_> {
     }
 
     fn rule_name(&mut self, name: &Name) {
-        if self.rules.contains(name) {
+        if self.rules.binary_search(name).is_ok() {
             return;
         }
         let suggestion = suggest(name, self.rules.iter().map(Name::as_str));
@@ -244,13 +246,14 @@ impl Check<'_> {
         let mut scope = Scope::new(scope_words);
         scope.extend(&pattern.nodes);
         scope.extend(parameters);
-        for (index, edge) in pattern.edges.iter().enumerate() {
+        let mut seen: BTreeMap<[&str; 3], &PatternEdge> = BTreeMap::new();
+        for edge in &pattern.edges {
             self.variable(&edge.from, &scope);
             self.variable(&edge.to, &scope);
-            let earlier = pattern.edges[..index]
-                .iter()
-                .find(|earlier| earlier.joins(&edge.from, &edge.label, &edge.to));
-            if let Some(earlier) = earlier {
+            let earlier = *seen
+                .entry([&edge.from, &edge.label, &edge.to])
+                .or_insert(edge);
+            if !std::ptr::eq(earlier, edge) {
                 let link = format!("{}->{}({})", edge.from, edge.to, edge.label);
                 let problem = if earlier.negated == edge.negated {
                     Problem::Duplicate {
@@ -271,13 +274,12 @@ impl Check<'_> {
 
     /// Variables declared side by side: distinct, of known types.
     fn declarations(&mut self, nodes: &[PatternNode]) {
-        for (index, node) in nodes.iter().enumerate() {
-            let earlier = nodes[..index]
-                .iter()
-                .find(|other| other.variable == node.variable);
-            if let Some(earlier) = earlier {
-                self.duplicate("variable", &earlier.variable, &node.variable);
+        let mut seen: BTreeSet<&Name> = BTreeSet::new();
+        for node in nodes {
+            if let Some(earlier) = seen.get(&node.variable) {
+                self.duplicate("variable", earlier, &node.variable);
             }
+            seen.insert(&node.variable);
             self.type_name(&node.type_name);
         }
     }

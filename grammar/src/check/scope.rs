@@ -5,12 +5,15 @@
 use super::Check;
 use crate::{AttributePath, Condition, Effect, Expression, Name, PatternNode, Problem, Rule};
 use dsr::suggest;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The variables that may be used at a place.
 pub(super) struct Scope {
     words: &'static str,
     bound: Vec<Name>,
-    deleted: Vec<Name>,
+    /// Where each is first among them.
+    places: BTreeMap<Name, usize>,
+    deleted: BTreeSet<Name>,
 }
 
 impl Scope {
@@ -18,7 +21,8 @@ impl Scope {
         Self {
             words,
             bound: Vec::new(),
-            deleted: Vec::new(),
+            places: BTreeMap::new(),
+            deleted: BTreeSet::new(),
         }
     }
 
@@ -27,16 +31,36 @@ impl Scope {
     }
 
     pub(super) fn extend<'a>(&mut self, nodes: impl IntoIterator<Item = &'a PatternNode>) {
-        self.bound
-            .extend(nodes.into_iter().map(|node| node.variable.clone()));
+        for node in nodes {
+            self.push(&node.variable);
+        }
+    }
+
+    fn push(&mut self, name: &Name) {
+        let place = self.bound.len();
+        self.places.entry(name.clone()).or_insert(place);
+        self.bound.push(name.clone());
+    }
+
+    /// Leaves all but the first so many.
+    fn truncate(&mut self, size: usize) {
+        for (place, name) in self.bound.drain(size..).enumerate() {
+            if self.places.get(&name) == Some(&(size + place)) {
+                self.places.remove(&name);
+            }
+        }
+    }
+
+    fn find(&self, name: &str) -> Option<&Name> {
+        self.places.get(name).map(|&place| &self.bound[place])
     }
 
     pub(super) fn contains(&self, name: &str) -> bool {
-        self.bound.iter().any(|bound| bound == name)
+        self.places.contains_key(name)
     }
 
     pub(super) fn is_deleted(&self, name: &str) -> bool {
-        self.deleted.iter().any(|deleted| deleted == name)
+        self.deleted.contains(name)
     }
 
     pub(super) fn names(&self) -> impl Iterator<Item = &str> {
@@ -63,20 +87,16 @@ impl Check<'_> {
         }
 
         let mut after = Scope::new("in this rule");
+        let (left, right) = (rule.left.index(), rule.right.index());
         let kept = |node: &&PatternNode| {
-            rule.left.node(&node.variable).is_none() || rule.right.node(&node.variable).is_some()
+            left.node(&node.variable).is_none() || right.node(&node.variable).is_some()
         };
         after.extend(rule.bound_nodes().filter(kept));
-        let created =
-            |node: &&PatternNode| !rule.bound_nodes().any(|b| b.variable == node.variable);
+        let created = |node: &&PatternNode| !before.contains(&node.variable);
         after.extend(rule.right.nodes.iter().filter(created));
-        after.deleted = before
-            .bound
-            .iter()
-            .filter(|name| !after.contains(name))
-            .cloned()
-            .collect();
-        self.effects(&rule.effect, &before, &mut after);
+        let gone = before.bound.iter().filter(|name| !after.contains(name));
+        after.deleted = gone.cloned().collect();
+        self.effects(&rule.effect, &mut before, &mut after);
     }
 
     pub(super) fn condition(&mut self, condition: &Condition, scope: &mut Scope) {
@@ -102,7 +122,7 @@ impl Check<'_> {
             Condition::Exists { variables, body } | Condition::Forall { variables, body } => {
                 let outer = self.quantify(variables, scope);
                 self.condition(body, scope);
-                scope.bound.truncate(outer);
+                scope.truncate(outer);
             }
             Condition::When {
                 condition,
@@ -118,12 +138,7 @@ impl Check<'_> {
     fn quantify(&mut self, variables: &[PatternNode], scope: &mut Scope) -> usize {
         self.declarations(variables);
         for variable in variables {
-            let outer = scope
-                .bound
-                .iter()
-                .find(|bound| **bound == variable.variable)
-                .cloned();
-            if let Some(outer) = outer {
+            if let Some(outer) = scope.find(&variable.variable).cloned() {
                 self.duplicate("variable", &outer, &variable.variable);
             }
         }
@@ -133,7 +148,7 @@ impl Check<'_> {
     }
 
     /// `before` is what conditions and values see, `after` what links and writes may name.
-    fn effects(&mut self, effects: &[Effect], before: &Scope, after: &mut Scope) {
+    fn effects(&mut self, effects: &[Effect], before: &mut Scope, after: &mut Scope) {
         let outer = after.bound.len();
         for effect in effects {
             match effect {
@@ -150,16 +165,13 @@ impl Check<'_> {
                     variable,
                     type_name,
                 } => {
-                    let known = after.bound.iter().chain(&before.bound);
-                    let known = known
-                        .chain(&after.deleted)
-                        .find(|name| *name == variable)
-                        .cloned();
-                    if let Some(first) = known {
+                    let known = after.find(variable).or_else(|| before.find(variable));
+                    let known = known.or_else(|| after.deleted.get(variable));
+                    if let Some(first) = known.cloned() {
                         self.duplicate("variable", &first, variable);
                     }
                     self.type_name(type_name);
-                    after.bound.push(variable.clone());
+                    after.push(variable);
                 }
                 Effect::Delete { variable } => self.variable(variable, after),
                 Effect::Retype {
@@ -170,23 +182,20 @@ impl Check<'_> {
                     self.type_name(type_name);
                 }
                 Effect::Forall { variables, body } => {
-                    let mut inner = Scope::new(before.words);
-                    inner.bound.clone_from(&before.bound);
-                    self.quantify(variables, &mut inner);
+                    let outer = self.quantify(variables, before);
                     let size = after.bound.len();
                     after.extend(variables);
-                    self.effects(body, &inner, after);
-                    after.bound.truncate(size);
+                    self.effects(body, before, after);
+                    after.truncate(size);
+                    before.truncate(outer);
                 }
                 Effect::When { condition, body } => {
-                    let mut inner = Scope::new(before.words);
-                    inner.bound.clone_from(&before.bound);
-                    self.condition(condition, &mut inner);
+                    self.condition(condition, before);
                     self.effects(body, before, after);
                 }
             }
         }
-        after.bound.truncate(outer);
+        after.truncate(outer);
     }
 
     /// Reports a link between what are no nodes, where its label looks like an effect that takes a variable and a type.

@@ -15,6 +15,7 @@ use super::kinds::{Kinds, types_of};
 use crate::{Binding, Diagnostic, Grammar, Rule};
 use dsr::{Graph, Schema, Time, Transaction};
 use pair::Pair;
+use std::borrow::Cow;
 use touch::{Index, Touched};
 
 /// How many ways of laying one rule over another are looked at.
@@ -113,19 +114,22 @@ impl Effort {
 
 /// The conflicts that are found with so much effort.
 pub(super) fn conflicts(grammar: &Grammar, schema: Option<&Schema>, effort: u64) -> Conflicts {
-    let mut awake = grammar.clone();
-    for rule in &mut awake.rules {
-        rule.dormant = false;
-        rule.activates.clear();
+    let sleeps = |rule: &Rule| rule.dormant || !rule.activates.is_empty();
+    let mut awake = Cow::Borrowed(grammar);
+    if grammar.rules.iter().any(sleeps) {
+        for rule in &mut awake.to_mut().rules {
+            rule.dormant = false;
+            rule.activates.clear();
+        }
     }
     let kinds = Kinds::new(&awake, awake.rules.iter().flat_map(types_of));
     let mut effort = Effort {
         left: effort,
         ground: Graph::in_memory(Schema::open()),
     };
-    let (pairs, left) = pairs(&awake, schema, &kinds, &mut effort);
-    let mut results = Results::of(&pairs, left);
-    let mut open: Vec<usize> = (0..pairs.len()).collect();
+    let pairs = Pairs::new(&awake, schema, &kinds, &mut effort);
+    let mut results = Results::of(&pairs);
+    let mut open: Vec<usize> = (0..pairs.all.len()).collect();
     let mut given = 0;
     // What pairs leave of their shares is for the others, and then for those that are not decided yet.
     while results.found < CONFLICT_LIMIT && !open.is_empty() {
@@ -144,13 +148,13 @@ pub(super) fn conflicts(grammar: &Grammar, schema: Option<&Schema>, effort: u64)
             let (all, rest) = (effort.left, (count - place) as u64);
             effort.left = (all / rest).max(SHARE).min(all);
             let share = effort.left;
-            let result = pairs[pair].smallest(&kinds, &mut effort);
+            let result = pairs.pair(pair).smallest(&kinds, &mut effort);
             effort.left += all - share;
             if matches!(result, Err(Undecided::Effort)) {
                 next.push(pair);
             }
             results.found += usize::from(matches!(result, Ok(Some(_))));
-            results.all[pair] = result;
+            results.all[pair] = result.map(|found| found.map(Box::new));
         }
         open = next;
     }
@@ -162,78 +166,100 @@ pub(super) fn conflicts(grammar: &Grammar, schema: Option<&Schema>, effort: u64)
     results.told(&pairs)
 }
 
-/// Pairs of rules of which the first changes something like what the second looks at; and how many more there
-/// are at least.
-fn pairs<'a>(
+/// Pairs of rules of which the first changes something like what the second looks at.
+struct Pairs<'a> {
     grammar: &'a Grammar,
     schema: Option<&'a Schema>,
-    kinds: &Kinds<'a>,
-    effort: &mut Effort,
-) -> (Vec<Pair<'a>>, usize) {
-    let rules = &grammar.rules;
-    let of = |rule: &'a Rule| match contradiction(grammar, rule, &[], schema) {
-        // What never matches disables nothing, and nothing disables it.
-        Some(_) => Touched::default(),
-        None => Touched::of(kinds, rule),
-    };
-    let touched: Vec<Touched> = rules.iter().map(of).collect();
-    let index = Index::new(&touched);
-    let (mut pairs, mut left) = (Vec::new(), 0);
-    for (first, changes) in rules.iter().zip(&touched) {
-        if pairs.len() >= PAIR_LIMIT || effort.left == 0 {
-            left += index.at_least(changes);
-            continue;
-        }
-        for two in index.of(changes) {
-            let looks = &touched[two];
-            if effort.spend(changes.checks(looks) * kinds.words()).is_err() {
-                left += 1;
+    touched: Vec<Touched<'a>>,
+    all: Vec<[u32; 2]>,
+    /// How many more there are at least.
+    left: usize,
+}
+
+impl<'a> Pairs<'a> {
+    fn new(
+        grammar: &'a Grammar,
+        schema: Option<&'a Schema>,
+        kinds: &'a Kinds<'a>,
+        effort: &mut Effort,
+    ) -> Self {
+        let of = |rule: &'a Rule| match contradiction(grammar, rule, &[], schema) {
+            // What never matches disables nothing, and nothing disables it.
+            Some(_) => Touched::default(),
+            None => Touched::of(kinds, rule),
+        };
+        let mut pairs = Self {
+            grammar,
+            schema,
+            touched: grammar.rules.iter().map(of).collect(),
+            all: Vec::new(),
+            left: 0,
+        };
+        let index = Index::new(&pairs.touched);
+        for (one, changes) in pairs.touched.iter().enumerate() {
+            if pairs.all.len() >= PAIR_LIMIT || effort.left == 0 {
+                pairs.left += index.at_least(changes);
                 continue;
             }
-            let needs = changes.needs(kinds, looks);
-            if !needs.is_empty() {
-                pairs.push(Pair {
-                    grammar,
-                    schema,
-                    first,
-                    second: &rules[two],
-                    depth: changes.depth.max(looks.depth),
-                    needs,
-                });
+            for two in index.of(changes) {
+                let looks = &pairs.touched[two];
+                if effort.spend(changes.checks(looks) * kinds.words()).is_err() {
+                    pairs.left += 1;
+                } else if changes.touches(kinds, looks) {
+                    pairs.all.push([one as u32, two as u32]);
+                }
             }
         }
+        pairs
     }
-    (pairs, left)
+
+    fn rules(&self, place: usize) -> [&'a Rule; 2] {
+        self.all[place].map(|rule| &self.grammar.rules[rule as usize])
+    }
+
+    /// What is needed to compare two of them, of which there may be too many to keep that for all.
+    fn pair(&self, place: usize) -> Pair<'_, 'a> {
+        let [first, second] = self.rules(place);
+        let [changes, looks] = self.all[place].map(|rule| &self.touched[rule as usize]);
+        Pair {
+            grammar: self.grammar,
+            schema: self.schema,
+            first,
+            second,
+            changes,
+            looks,
+        }
+    }
 }
 
 /// What was found out, pair by pair.
 struct Results {
-    all: Vec<Result<Option<Conflict>, Undecided>>,
+    all: Vec<Result<Option<Box<Conflict>>, Undecided>>,
     found: usize,
     left: usize,
 }
 
 impl Results {
-    fn of(pairs: &[Pair], left: usize) -> Self {
+    fn of(pairs: &Pairs) -> Self {
         Self {
-            all: pairs.iter().map(|_| Err(Undecided::Effort)).collect(),
+            all: pairs.all.iter().map(|_| Err(Undecided::Effort)).collect(),
             found: 0,
-            left,
+            left: pairs.left,
         }
     }
 
-    fn told(self, pairs: &[Pair]) -> Conflicts {
+    fn told(self, pairs: &Pairs) -> Conflicts {
         let mut told = Conflicts {
             left: self.left,
             ..Conflicts::default()
         };
-        for (pair, result) in pairs.iter().zip(self.all) {
+        for (place, result) in self.all.into_iter().enumerate() {
             match result {
-                Ok(conflict) => told.found.extend(conflict),
+                Ok(conflict) => told.found.extend(conflict.map(|conflict| *conflict)),
                 Err(why) => {
                     told.left += 1;
                     if told.undecided.len() < CONFLICT_LIMIT {
-                        let names = [pair.first, pair.second].map(|rule| rule.name.to_string());
+                        let names = pairs.rules(place).map(|rule| rule.name.to_string());
                         let [first, second] = names;
                         told.undecided.push((first, second, why));
                     }

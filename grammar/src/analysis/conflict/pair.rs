@@ -4,14 +4,15 @@
 //! shown to be no such case.
 
 use super::joint::{Disabled, Joint};
-use super::overlay::{Laid, Overlays, Shared, Sides};
+use super::overlay::{Laid, Overlays, Sides};
+use super::touch::Touched;
 use super::{Conflict, Effort, Undecided};
 use crate::analysis::complete::{Drawn, Ways};
 use crate::analysis::draft::{Draft, Link, Places};
 use crate::analysis::kinds::Kinds;
 use crate::matching::conjuncts;
-use crate::{Binding, Condition, Diagnostic, Grammar, PatternNode, Problem, Rule};
-use dsr::{Graph, Schema, Time, Transaction};
+use crate::{Binding, Condition, Diagnostic, Grammar, Obstacle, PatternNode, Problem, Rule};
+use dsr::{Graph, Operation, Schema, Time, Transaction};
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
@@ -29,15 +30,15 @@ const COMPARISON: u64 = 100;
 const TRIAL_LIMIT: u64 = 100_000;
 
 /// Two rules that are compared, and what is known of them.
-pub(super) struct Pair<'a> {
+pub(super) struct Pair<'p, 'a> {
     pub(super) grammar: &'a Grammar,
     pub(super) schema: Option<&'a Schema>,
     pub(super) first: &'a Rule,
     pub(super) second: &'a Rule,
-    /// How deep the quantifiers of either go.
-    pub(super) depth: u32,
-    /// Of these sets of nodes one must be shared.
-    pub(super) needs: BTreeSet<Vec<Shared>>,
+    /// What the first changes.
+    pub(super) changes: &'p Touched<'a>,
+    /// What the second looks at.
+    pub(super) looks: &'p Touched<'a>,
 }
 
 /// What makes two drafts the same graph; the smallest come first.
@@ -78,27 +79,36 @@ impl Drafts {
     }
 }
 
-impl Pair<'_> {
+impl<'a> Pair<'_, 'a> {
     /// The conflict with the fewest nodes, and of these the fewest links.
     pub(super) fn smallest(
         &self,
-        kinds: &Kinds,
+        kinds: &Kinds<'a>,
         effort: &mut Effort,
     ) -> Result<Option<Conflict>, Undecided> {
-        let Some(sides) = Sides::new(kinds, [self.first, self.second], &self.needs) else {
+        let both = [self.first, self.second];
+        if both
+            .map(|rule| rule.bound_nodes().count())
+            .iter()
+            .sum::<usize>()
+            > NODE_LIMIT
+        {
+            return Err(Undecided::Size);
+        }
+        effort.spend(self.changes.checks(self.looks) * kinds.words())?;
+        let needs = self.changes.needs(kinds, self.looks);
+        let depth = self.changes.depth.max(self.looks.depth);
+        let Some(sides) = Sides::new(kinds, both, &needs) else {
             // No node can be of all the types of a variable.
             return Ok(None);
         };
-        if sides.nodes() > NODE_LIMIT {
-            return Err(Undecided::Size);
-        }
         let mut overlays = Overlays::new(&sides);
         let mut drafts = Drafts::default();
         let mut may = false;
         for beside in 0..=sides.second.len() {
             let before = overlays.steps;
             let choices = overlays.with_beside(beside);
-            effort.spend((overlays.steps - before) * self.needs.len() as u64)?;
+            effort.spend((overlays.steps - before) * needs.len() as u64)?;
             for choice in choices {
                 effort.spend(sides.nodes() as u64)?;
                 let Some(laid) = overlays.drawn(&choice) else {
@@ -125,7 +135,7 @@ impl Pair<'_> {
                 sides.first.len() + beside
             };
             while let Some((draft, laid)) = drafts.next(most) {
-                let cost = (draft.nodes.len() as u64).saturating_pow(self.depth);
+                let cost = (draft.nodes.len() as u64).saturating_pow(depth);
                 if cost > TRIAL_LIMIT {
                     return Err(Undecided::Size);
                 }
@@ -271,12 +281,37 @@ impl Pair<'_> {
         let second = joint.second();
         let named = bound(second, &joint.places)?;
         let obstacle = grammar.obstacle(&after, second, &named).ok()??;
+        let made = change
+            .operations
+            .iter()
+            .filter_map(|operation| match operation {
+                Operation::CreateNode { name, .. } => Some(name.as_str()),
+                _ => None,
+            });
         Some(Trial {
+            reason: reason(&obstacle, &self.first.name, made),
             first: one,
             second: two,
-            reason: obstacle.to_string(),
         })
     }
+}
+
+/// What does not hold after the first rule, in words that also tell of nodes which the drawn graph does not have, as
+/// that rule makes them.
+fn reason<'n>(obstacle: &Obstacle, first: &str, made: impl Iterator<Item = &'n str>) -> String {
+    let reason = match obstacle {
+        // It has no name any more, and is called as in the drawn graph.
+        Obstacle::NoNode { node } => format!("`{first}` deletes {}", node.variable),
+        other => other.to_string(),
+    };
+    let between = |c: char| !(c.is_alphanumeric() || c == '_');
+    let made: Vec<&str> = made
+        .filter(|name| reason.split(between).any(|word| word == *name))
+        .collect();
+    if made.is_empty() {
+        return reason;
+    }
+    format!("{reason}, where `{first}` makes {}", made.join(" and "))
 }
 
 /// What came of trying a draft out.

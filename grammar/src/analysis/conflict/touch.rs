@@ -48,7 +48,26 @@ pub(super) struct Touched<'g> {
     pub(super) depth: u32,
 }
 
-type Scope<'g> = BTreeMap<&'g str, End>;
+/// The variables of a formula, beside those of what stands around it.
+#[derive(Default)]
+struct Scope<'s, 'g> {
+    around: Option<&'s Scope<'s, 'g>>,
+    own: BTreeMap<&'g str, End>,
+}
+
+impl<'g> Scope<'_, 'g> {
+    fn get(&self, name: &str) -> Option<&End> {
+        let mut scopes = std::iter::successors(Some(self), |scope| scope.around);
+        scopes.find_map(|scope| scope.own.get(name))
+    }
+
+    fn inside(&self) -> Scope<'_, 'g> {
+        Scope {
+            around: Some(self),
+            own: BTreeMap::new(),
+        }
+    }
+}
 
 struct Reader<'a, 'g> {
     kinds: &'a Kinds<'g>,
@@ -62,22 +81,23 @@ impl<'g> Touched<'g> {
             kinds,
             touched: Touched::default(),
         };
-        let mut scope = Scope::new();
+        let (left, right) = (rule.left.index(), rule.right.index());
+        let mut scope = Scope::default();
         for (place, node) in rule.bound_nodes().enumerate() {
             if let Some(end) = reader.declare(&mut scope, node, How::Bound) {
                 let end = End { place, ..end };
-                scope.insert(&node.variable, end);
+                scope.own.insert(&node.variable, end);
                 reader.touched.looks.push(Thing::Node(end, None));
-                let after = rule.right.node(&node.variable);
+                let after = right.node(&node.variable);
                 let becomes = after.and_then(|after| kinds.find(&after.type_name));
-                let is_parameter = rule.left.node(&node.variable).is_none();
+                let is_parameter = left.node(&node.variable).is_none();
                 if becomes != Some(end.kind) && (after.is_some() || !is_parameter) {
                     reader.touched.changes.push(Thing::Node(end, becomes));
                 }
             }
         }
         for node in &rule.right.nodes {
-            if !scope.contains_key(&*node.variable)
+            if scope.get(&node.variable).is_none()
                 && let Some(end) = reader.declare(&mut scope, node, How::Made)
             {
                 reader.touched.changes.push(Thing::New(end.kind));
@@ -86,13 +106,13 @@ impl<'g> Touched<'g> {
         for edge in &rule.left.edges {
             let names = (&edge.from, &edge.label, &edge.to);
             reader.look_at(&scope, names, Some(!edge.negated));
-            let kept = rule.right.edge(&edge.from, &edge.label, &edge.to);
+            let kept = right.edge(&edge.from, &edge.label, &edge.to);
             if !edge.negated && kept.is_none_or(|kept| kept.negated) {
                 reader.change(&scope, names, false);
             }
         }
         for edge in &rule.right.edges {
-            let before = rule.left.edge(&edge.from, &edge.label, &edge.to);
+            let before = left.edge(&edge.from, &edge.label, &edge.to);
             if edge.negated || before.is_none_or(|before| before.negated) {
                 reader.change(&scope, (&edge.from, &edge.label, &edge.to), !edge.negated);
             }
@@ -107,6 +127,12 @@ impl<'g> Touched<'g> {
     /// What [`Self::needs`] costs.
     pub(super) fn checks(&self, other: &Self) -> u64 {
         (self.changes.len() * other.looks.len()) as u64
+    }
+
+    /// Whether anything that is changed here is of a kind that the other looks at.
+    pub(super) fn touches(&self, kinds: &Kinds<'g>, other: &Self) -> bool {
+        let mut changes = self.changes.iter();
+        changes.any(|change| other.looks.iter().any(|look| touches(kinds, change, look)))
     }
 
     /// Of these sets of nodes one must be shared for a change here to be of what the other looks at; none where
@@ -132,24 +158,24 @@ impl<'g> Touched<'g> {
 }
 
 impl<'g> Reader<'_, 'g> {
-    fn declare(&self, scope: &mut Scope<'g>, node: &'g PatternNode, how: How) -> Option<End> {
+    fn declare(&self, scope: &mut Scope<'_, 'g>, node: &'g PatternNode, how: How) -> Option<End> {
         let kind = self.kinds.find(&node.type_name)?;
         let place = 0;
         let end = End { kind, how, place };
-        scope.insert(&node.variable, end);
+        scope.own.insert(&node.variable, end);
         Some(end)
     }
 
     fn link(
-        scope: &Scope<'g>,
+        scope: &Scope<'_, 'g>,
         (from, label, to): (&'g Name, &'g Name, &'g Name),
         there: Option<bool>,
     ) -> Option<Thing<'g>> {
-        let ends = [*scope.get(&**from)?, *scope.get(&**to)?];
+        let ends = [*scope.get(from)?, *scope.get(to)?];
         Some(Thing::Link(ends, label, there))
     }
 
-    fn change(&mut self, scope: &Scope<'g>, link: (&'g Name, &'g Name, &'g Name), there: bool) {
+    fn change(&mut self, scope: &Scope<'_, 'g>, link: (&'g Name, &'g Name, &'g Name), there: bool) {
         self.touched
             .changes
             .extend(Self::link(scope, link, Some(there)));
@@ -157,14 +183,14 @@ impl<'g> Reader<'_, 'g> {
 
     fn look_at(
         &mut self,
-        scope: &Scope<'g>,
+        scope: &Scope<'_, 'g>,
         link: (&'g Name, &'g Name, &'g Name),
         there: Option<bool>,
     ) {
         self.touched.looks.extend(Self::link(scope, link, there));
     }
 
-    fn condition(&mut self, scope: &Scope<'g>, condition: &'g Condition, depth: u32) {
+    fn condition(&mut self, scope: &Scope<'_, 'g>, condition: &'g Condition, depth: u32) {
         self.touched.depth = self.touched.depth.max(depth);
         match condition {
             Condition::Edge { label, from, to } => self.look_at(scope, (from, label, to), None),
@@ -180,7 +206,7 @@ impl<'g> Reader<'_, 'g> {
                 }
             }
             Condition::Exists { variables, body } | Condition::Forall { variables, body } => {
-                let mut scope = scope.clone();
+                let mut scope = scope.inside();
                 for node in variables {
                     let end = self.declare(&mut scope, node, How::Quantified);
                     let look = end.map(|end| Thing::Node(end, None));
@@ -199,19 +225,19 @@ impl<'g> Reader<'_, 'g> {
         }
     }
 
-    fn value(scope: &Scope<'g>, path: &'g AttributePath) -> Option<Thing<'g>> {
+    fn value(scope: &Scope<'_, 'g>, path: &'g AttributePath) -> Option<Thing<'g>> {
         Some(match path {
             AttributePath::Node {
                 variable,
                 attribute,
-            } => Thing::Value(attribute, Ok(*scope.get(&**variable)?)),
+            } => Thing::Value(attribute, Ok(*scope.get(variable)?)),
             AttributePath::Edge {
                 label, attribute, ..
             } => Thing::Value(attribute, Err(label)),
         })
     }
 
-    fn expression(&mut self, scope: &Scope<'g>, expression: &'g Expression) {
+    fn expression(&mut self, scope: &Scope<'_, 'g>, expression: &'g Expression) {
         match expression {
             Expression::Literal(_) => {}
             Expression::Attribute(path) => {
@@ -231,7 +257,7 @@ impl<'g> Reader<'_, 'g> {
         }
     }
 
-    fn effects(&mut self, scope: &mut Scope<'g>, effects: &'g [Effect], depth: u32) {
+    fn effects(&mut self, scope: &mut Scope<'_, 'g>, effects: &'g [Effect], depth: u32) {
         self.touched.depth = self.touched.depth.max(depth);
         for effect in effects {
             match effect {
@@ -246,12 +272,12 @@ impl<'g> Reader<'_, 'g> {
                 } => {
                     if let Some(kind) = self.kinds.find(type_name) {
                         let (how, place) = (How::Made, 0);
-                        scope.insert(variable, End { kind, how, place });
+                        scope.own.insert(variable, End { kind, how, place });
                         self.touched.changes.push(Thing::New(kind));
                     }
                 }
                 Effect::Delete { variable } => {
-                    let gone = scope.get(&**variable).map(|end| Thing::Node(*end, None));
+                    let gone = scope.get(variable).map(|end| Thing::Node(*end, None));
                     self.touched.changes.extend(gone);
                 }
                 Effect::Retype {
@@ -259,12 +285,12 @@ impl<'g> Reader<'_, 'g> {
                     type_name,
                 } => {
                     let becomes = self.kinds.find(type_name);
-                    let end = scope.get(&**variable);
+                    let end = scope.get(variable);
                     let change = end.map(|end| Thing::Node(*end, becomes));
                     self.touched.changes.extend(change);
                 }
                 Effect::Forall { variables, body } => {
-                    let mut scope = scope.clone();
+                    let mut scope = scope.inside();
                     for node in variables {
                         self.declare(&mut scope, node, How::Quantified);
                     }
@@ -276,7 +302,7 @@ impl<'g> Reader<'_, 'g> {
                     let looks = self.touched.looks.len();
                     self.condition(scope, condition, depth);
                     self.touched.looks.truncate(looks);
-                    self.effects(&mut scope.clone(), body, depth);
+                    self.effects(&mut scope.inside(), body, depth);
                 }
             }
         }
