@@ -186,6 +186,7 @@ mod tests {
             rule("bad", "r:robt"),
             rule("bad", "r:robot r->x(in)"),
             rule("dormant bad", "r:robot r->->x(in)"),
+            rule("bad", "r:robot").replace("bad :", "bad"),
         ] {
             let found = sound(&format!("{TYPES}{good}{bad}{last}")).unwrap();
             assert_eq!(found, [vec!["good", "last"], vec!["bad"]], "{bad}");

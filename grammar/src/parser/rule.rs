@@ -91,11 +91,14 @@ impl Parser<'_> {
             .unwrap_or(self.tokens.len());
         let name = self.tokens[first..self.limit]
             .windows(2)
+            .take_while(|pair| pair[0].kind != TokenKind::Symbol("{"))
             .find(|pair| pair[1].kind == TokenKind::Symbol(":"))
             .map(|pair| pair[0].range.clone())
             .map(|range| Name::new(&self.text[range.clone()], self.span(range)));
-        let mut header = Header::new(name.clone().unwrap_or_default());
-        if self.header(&mut header).is_none() {
+        let mut header = Header::new(name.unwrap_or_default());
+        let read = self.header(&mut header);
+        let name = (!header.name.is_empty()).then(|| header.name.clone());
+        if read.is_none() {
             while self.peek().is_some() && !self.is_symbol("{") {
                 self.bump();
             }
@@ -120,7 +123,10 @@ impl Parser<'_> {
     fn header(&mut self, header: &mut Header) -> Option<()> {
         self.modifiers(header)?;
         header.name = self.name("a rule's name")?;
-        self.expect(":", "`:` after the rule's name")?;
+        let colon = self.expect(":", "`:` after the rule's name");
+        if colon.is_none() && !KINDS.contains(&self.token_text(self.at)) {
+            return None;
+        }
         while MODIFIERS.contains(&self.token_text(self.at)) {
             let word = self.token_text(self.at).to_owned();
             let range = self.bump();
@@ -152,7 +158,12 @@ impl Parser<'_> {
 
     /// The words before a rule's name.
     fn modifiers(&mut self, header: &mut Header) -> Option<()> {
-        while self.is_word_at(self.at + 1) || self.is_digits(self.at + 1) {
+        let names = |parser: &Self| {
+            let next = parser.at + 1;
+            let kind = KINDS.contains(&parser.token_text(next));
+            (parser.is_word_at(next) || parser.is_digits(next)) && !kind
+        };
+        while names(self) {
             let expected = "`dormant`, `hierarchical`, `strict` or a rule's name";
             if let Some(modifier) = self.keyword_among(&MODIFIERS, expected) {
                 let range = self.bump();
@@ -164,7 +175,7 @@ impl Parser<'_> {
                 continue;
             }
             // What no word was meant to be is told once, and the name may still come.
-            while self.is_word_at(self.at + 1) || self.is_digits(self.at + 1) {
+            while names(self) {
                 self.bump();
             }
             return self.is_symbol_at(self.at + 1, ":").then_some(());

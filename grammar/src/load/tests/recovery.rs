@@ -16,6 +16,10 @@ b : active(one cots(2) agnet(nav)
 {
 	{ p:t } => { p:t }
 }
+strict c active(1) wings(4)
+{
+	{ p:t } => { q:t p->p(l) }
+}
 ",
         &expect![[r#"
             f.aggl:3:1: error: expected `dormant`, `hierarchical`, `strict` or a rule's name, found `dormnat` (did you mean `dormant`?)
@@ -30,7 +34,11 @@ b : active(one cots(2) agnet(nav)
             f.aggl:5:22: error: no variable `p` on the right side (did you mean `q`?)
             f.aggl:7:12: error: expected a number, found `one`
             f.aggl:7:16: error: expected `{`, `success`, `activates`, `cost`, `duration` or `agent`, found `cots` (did you mean `cost`?)
-            f.aggl:7:24: error: expected `{`, `success`, `activates`, `cost`, `duration` or `agent`, found `agnet` (did you mean `agent`?)"#]],
+            f.aggl:7:24: error: expected `{`, `success`, `activates`, `cost`, `duration` or `agent`, found `agnet` (did you mean `agent`?)
+            f.aggl:11:10: error: expected `:` after the rule's name, found `active`
+            f.aggl:11:20: error: expected `{`, `success`, `activates`, `cost`, `duration` or `agent`, found `wings`
+            f.aggl:13:19: error: no variable `p` on the right side (did you mean `q`?)
+            f.aggl:13:22: error: no variable `p` on the right side (did you mean `q`?)"#]],
     );
 }
 
