@@ -50,11 +50,11 @@ impl Progress {
     }
 
     /// So many of `all` are done, of which this was one: on a terminal a bar, elsewhere a line for each tenth.
-    pub(crate) fn count(&self, done: usize, all: usize, what: &str) {
+    pub(crate) fn count(&self, done: usize, all: usize) {
         if let Some(bar) = &self.bar {
             bar.set_length(all.max(1) as u64);
             bar.set_position(done as u64);
-            bar.set_message(format!("{done} of {all}  {what}"));
+            bar.set_message(format!("{done} of {all}"));
         } else if done * 10 / all.max(1) > (done - 1) * 10 / all.max(1) {
             self.say(&format!("{done} of {all}"));
         }

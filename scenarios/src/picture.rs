@@ -12,11 +12,13 @@ mod path;
 mod people;
 mod png;
 mod social;
+mod surface;
 #[cfg(test)]
 mod tests;
 
 pub use png::{PngError, png};
 pub use social::{Show, social};
+pub use surface::Surface;
 
 use crate::metrics::{Encounter, Metrics, ObjectSpace, closest_encounter, in_order};
 use crate::scenario::Scenario;

@@ -11,7 +11,7 @@ mod social_force;
 pub use plain::Method;
 
 use crate::metrics::mapped;
-use crate::scenario::Scenario;
+use crate::scenario::{Scenario, Wall};
 use crate::tracks::Tracks;
 use crate::world::{Inputs as WorldInputs, Truth, World};
 use agents::navigation::control::Limits;
@@ -39,6 +39,8 @@ pub struct Trial<'a> {
     pub seed: u64,
     /// Recorded pedestrians who take the place of the scenario's.
     pub tracks: Option<&'a Tracks>,
+    /// Walls that the map does not show; only the laser sees them.
+    pub unmapped: &'a [Wall],
     /// How the robot finds its way.
     pub method: Method,
     /// Whether people and objects are more than obstacles; only to our navigation.
@@ -115,7 +117,9 @@ impl Trial<'_> {
     /// [`TrialError`] where there is no social map of the scenario.
     pub fn drive(&self) -> Result<Drive, TrialError> {
         let scenario = self.scenario;
-        let mut world = World::new(scenario, self.seed, self.tracks.cloned());
+        let mut walled = scenario.clone();
+        walled.walls.extend(self.unmapped);
+        let mut world = World::new(&walled, self.seed, self.tracks.cloned());
         let mut mapper = SocialMapper::new(scenario.social.clone())
             .map_err(|problems| TrialError::Config { problems })?;
         let mut scene = self.scene();
@@ -266,6 +270,7 @@ mod tests {
             scenario: &scenario,
             seed: 3,
             tracks: None,
+            unmapped: &[],
             method: Method::Navigation,
             social: true,
             targets: vec![Target::Point(Point2::new(4.0, 6.0))],
@@ -288,6 +293,7 @@ mod tests {
                 scenario: &scenario,
                 seed: 1,
                 tracks: None,
+                unmapped: &[],
                 method,
                 social: false,
                 targets: vec![Target::Point(Point2::new(13.2, 1.5))],
@@ -313,6 +319,7 @@ mod tests {
             scenario: &scenario,
             seed: 1,
             tracks: Some(&tracks),
+            unmapped: &[],
             method: Method::AStar,
             social: false,
             targets: vec![Target::Point(Point2::new(13.0, 8.0))],

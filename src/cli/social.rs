@@ -123,7 +123,7 @@ pub(crate) struct Experiment {
     /// `compare`: one more world with them
     #[arg(long, value_name = "FILE")]
     pub(crate) tracks: Option<PathBuf>,
-    /// For `tg-shapes` and `tg-groups`: write the figures as ours are to this folder (.svg and .png)
+    /// For `tg-shapes`, `tg-groups` and `td-gains`: write the figures as ours are to this folder (.svg and .png)
     #[arg(long, value_name = "DIR")]
     pub(crate) pictures: Option<PathBuf>,
     /// For machines

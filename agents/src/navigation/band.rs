@@ -31,10 +31,11 @@ pub struct Gains {
 }
 
 impl Default for Gains {
+    /// Contraction and repulsion are what `cortex experiment td-gains` finds.
     fn default() -> Self {
         Self {
-            contraction: 0.06,
-            repulsion: 0.06,
+            contraction: 0.055,
+            repulsion: 0.045,
             social: 0.05,
             reach: 1.0,
             spacing: 0.25,

@@ -78,7 +78,7 @@ impl Obstacles {
 }
 
 /// The point of `wall` nearest to `place`.
-pub(super) fn nearest(wall: &Wall, place: Point2<f64>) -> Point2<f64> {
+pub fn nearest(wall: &Wall, place: Point2<f64>) -> Point2<f64> {
     let along = wall[1] - wall[0];
     let squared = along.norm_squared();
     let share = if squared > 0.0 {

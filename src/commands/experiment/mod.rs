@@ -9,6 +9,9 @@ mod perception;
 mod social_groups;
 mod social_shapes;
 mod table;
+mod workers;
+
+use drives::gains;
 
 use super::output::{print, print_json};
 use crate::cli::Experiment as Arguments;
@@ -54,9 +57,9 @@ const EXPERIMENTS: &[Experiment] = &[
         run: drives::table4,
     },
     Experiment {
-        name: "td-gains",
+        name: gains::NAME,
         about: "the search for the gains of the elastic band (TD 5.4)",
-        run: drives::gains,
+        run: |seeds| Ok(gains::search(seeds, &Progress::new(gains::NAME, true))?.table()),
     },
     Experiment {
         name: perception::NAME,
@@ -124,14 +127,18 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
         return Ok(Answer::Yes);
     }
     let experiment = find(&arguments.name)?;
+    if experiment.name == gains::NAME && arguments.tracks.is_none() {
+        return search_gains(arguments, experiment.about);
+    }
     let drawing = PICTURES.iter().find(|(name, _)| *name == experiment.name);
     let pictures = match (&arguments.pictures, drawing) {
         (None, _) => Vec::new(),
         (Some(folder), Some((_, draw))) => drawn::write(&draw()?, folder)?,
         (Some(_), None) => {
-            let names: Vec<&str> = PICTURES.iter().map(|(name, _)| *name).collect();
+            let names = PICTURES.iter().map(|(name, _)| *name);
+            let names: Vec<&str> = names.chain([gains::NAME]).collect();
             let what = format!("`{}` has no pictures", experiment.name);
-            let help = format!("`--pictures` is for {}", names.join(" and "));
+            let help = format!("`--pictures` is for {}", names.join(", "));
             return Err(Failure::input_with_help(what, help));
         }
     };
@@ -160,14 +167,35 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
         }
         print_json(&json)?;
     } else {
-        let mut text = table.text(experiment.name, experiment.about);
-        if !pictures.is_empty() {
-            // Writing to a string does not fail.
-            let _ = writeln!(text, "\npictures: {}", pictures.join(", "));
-        }
-        print(&text)?;
+        print_text(table.text(experiment.name, experiment.about), &pictures)?;
     }
     Ok(Answer::Yes)
+}
+
+/// The search for gains, which takes a minute and has a picture of what it found.
+fn search_gains(arguments: &Arguments, about: &str) -> Result<Answer, Failure> {
+    let progress = Progress::new(gains::NAME, false);
+    let search = gains::search(arguments.seeds, &progress)?;
+    drop(progress);
+    let pictures = match &arguments.pictures {
+        Some(folder) => drawn::write(&[search.picture()], folder)?,
+        None => Vec::new(),
+    };
+    if arguments.json {
+        print_json(&search.json(about))?;
+    } else {
+        print_text(search.table().text(gains::NAME, about), &pictures)?;
+    }
+    Ok(Answer::Yes)
+}
+
+/// Prints a table, and which pictures there are.
+fn print_text(mut text: String, pictures: &[String]) -> Result<(), Failure> {
+    if !pictures.is_empty() {
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "\npictures: {}", pictures.join(", "));
+    }
+    print(&text)
 }
 
 /// The comparison, which takes minutes: it shows how far it is.

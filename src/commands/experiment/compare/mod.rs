@@ -5,6 +5,7 @@
 mod figures;
 
 use super::drives::scene;
+use super::workers;
 use crate::Failure;
 use crate::bench::Chance;
 use crate::progress::Progress;
@@ -18,11 +19,7 @@ use scenarios::metrics::{measure, object_spaces, shortest_way, spl};
 use scenarios::trial::{Method, Trial};
 use scenarios::{Scenario, Tracks};
 use std::f64::consts::{PI, TAU};
-use std::num::NonZero;
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::mpsc;
-use std::thread;
 
 /// How the comparison is called.
 pub(super) const NAME: &str = "compare";
@@ -189,6 +186,7 @@ fn drive(world: &World, way: &Way, seed: u64, seeds: u64) -> Result<Values, Fail
         scenario: &scenario,
         seed,
         tracks: world.tracks.as_ref(),
+        unmapped: &[],
         method: way.method,
         social: way.social,
         targets: vec![Target::Point(goal)],
@@ -207,7 +205,7 @@ fn drive(world: &World, way: &Way, seed: u64, seeds: u64) -> Result<Values, Fail
         .collect())
 }
 
-/// Drives all ways through all worlds with so many seeds, as many drives at a time as there are processors.
+/// Drives all ways through all worlds with so many seeds.
 pub(super) fn compare(
     seeds: u64,
     recording: Option<&Path>,
@@ -215,38 +213,11 @@ pub(super) fn compare(
 ) -> Result<Comparison, Failure> {
     let worlds = worlds(recording)?;
     let each = WAYS.len() * seeds as usize;
-    let all = worlds.len() * each;
-    let next = AtomicUsize::new(0);
-    let (sender, receiver) = mpsc::channel();
-    let workers = thread::available_parallelism().map_or(1, NonZero::get);
-    let mut driven = vec![None; all];
-    thread::scope(|scope| {
-        for _ in 0..workers.min(all) {
-            let (worlds, next, sender) = (&worlds, &next, sender.clone());
-            scope.spawn(move || {
-                loop {
-                    let job = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(world) = worlds.get(job / each) else {
-                        break;
-                    };
-                    let way = &WAYS[job % each / seeds as usize];
-                    let seed = (job % seeds as usize) as u64 + 1;
-                    let done = drive(world, way, seed, seeds);
-                    if sender.send((job, done)).is_err() {
-                        break;
-                    }
-                }
-            });
-        }
-        drop(sender);
-        for (count, (job, done)) in receiver.iter().enumerate() {
-            let done = done.inspect_err(|_| next.store(all, Ordering::Relaxed))?;
-            driven[job] = Some(done);
-            progress.count(count + 1, all, worlds[job / each].name);
-        }
-        Ok::<_, Failure>(())
+    let driven = workers::each(worlds.len() * each, progress, |job| {
+        let way = &WAYS[job % each / seeds as usize];
+        let seed = (job % seeds as usize) as u64 + 1;
+        drive(&worlds[job / each], way, seed, seeds)
     })?;
-    let driven: Vec<Values> = driven.into_iter().flatten().collect();
     let worlds = worlds
         .iter()
         .zip(driven.chunks(each))

@@ -85,6 +85,7 @@ fn drive(
         scenario,
         seed,
         tracks: None,
+        unmapped: &[],
         method: Method::Navigation,
         social,
         targets,

@@ -3,11 +3,10 @@
 //! printed; everything else follows from planning and control.
 
 mod company;
-mod gains;
+pub(super) mod gains;
 mod tables;
 
 pub(super) use company::{approaches, escort};
-pub(super) use gains::gains;
 pub(super) use tables::{table1, table2, table4};
 
 use crate::Failure;

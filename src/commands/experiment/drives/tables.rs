@@ -70,6 +70,7 @@ fn figures(printed: &Printed, way: &Way, seed: u64) -> Result<(bool, u64, Vec<f6
         scenario: &scenario,
         seed,
         tracks: None,
+        unmapped: &[],
         method: Method::Navigation,
         social: way.social,
         targets: vec![Target::Point(Point2::new(printed.goal.0, printed.goal.1))],
