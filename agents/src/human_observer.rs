@@ -6,6 +6,7 @@
 //! given to a person is never given to another, and that the same frames in any order within one
 //! call give the same scene to the bit.
 
+mod appearance;
 mod config;
 mod graph;
 mod identity;
@@ -17,12 +18,13 @@ mod track;
 #[cfg(test)]
 mod tests;
 
-pub use config::{Association, Config, Nearest, Thresholds, Tracking};
+pub use config::{Appearances, Association, Config, Nearest, Thresholds, Tracking};
 pub use graph::{HumanObserver, SETTINGS, people, person_id, person_name, surroundings};
 pub use scene::{Object, Scene, Shape, Surroundings, TrackedPerson};
 
 use crate::messages::CameraFrame;
 use crate::perception::{FloorPlan, Pair, assign, hides, in_time_order, is_finite_pose, sees};
+use appearance::{Appearance, Gallery};
 use dsr::Time;
 use nalgebra::Point2;
 use relations::Relations;
@@ -43,6 +45,8 @@ pub struct Observer {
     cameras: BTreeMap<String, Time>,
     /// Pairs of people who may be one.
     suspects: BTreeMap<(u64, u64), identity::Suspicion>,
+    /// Those whose tracks are over.
+    gallery: Gallery,
     refused: Refused,
 }
 
@@ -57,6 +61,8 @@ pub struct Refused {
     pub absurd_frames: u64,
     /// Detections that are no number or lie out of their camera's range.
     pub absurd_detections: u64,
+    /// Looks that give no direction; the detections themselves count.
+    pub absurd_appearances: u64,
 }
 
 /// A camera's clock may run ahead of ours by this much, s.
@@ -74,6 +80,7 @@ impl Observer {
             clock: None,
             cameras: BTreeMap::new(),
             suspects: BTreeMap::new(),
+            gallery: Gallery::default(),
             refused: Refused::default(),
         }
     }
@@ -163,7 +170,7 @@ impl Observer {
         self.count_misses(frame, since, &sightings, plan);
         let newborn = free
             .iter()
-            .map(|&index| Track::new(sightings[index], self.frame, &self.config));
+            .map(|&index| Track::new(&sightings[index], self.frame, &self.config));
         self.tracks.extend(newborn);
         self.confirm(plan);
         self.bury(frame.time);
@@ -173,9 +180,17 @@ impl Observer {
     /// Forgets those for whom the evidence has run out at `now`.
     fn bury(&mut self, now: Time) {
         let config = &self.config;
-        self.tracks.retain(|track| !match config.association {
-            Association::Evidence => track.is_dead(now, config),
-            Association::Nearest => nearest::is_dead(track, now, &config.nearest),
+        let gallery = &mut self.gallery;
+        self.tracks.retain(|track| match config.association {
+            Association::Evidence => {
+                let dead = track.is_dead(now, config);
+                if dead && let (Some(id), Some(looks)) = (track.id, &track.appearance) {
+                    let (time, place) = (track.last_seen, track.last_place());
+                    gallery.remember(id, looks.clone(), time, place, &config.appearance);
+                }
+                !dead
+            }
+            Association::Nearest => !nearest::is_dead(track, now, &config.nearest),
         });
     }
 
@@ -192,7 +207,11 @@ impl Observer {
             if !sane {
                 self.refused.absurd_detections += 1;
             } else if person.score >= self.config.least_score {
+                let appearance = Appearance::of(&person.appearance);
+                let absurd = appearance.is_none() && !person.appearance.is_empty();
+                self.refused.absurd_appearances += u64::from(absurd);
                 sightings.push(Sighting {
+                    appearance,
                     time: frame.time,
                     position: frame.world_from_camera * person.position,
                     heading: person.heading.map(|heading| heading + turn),

@@ -49,6 +49,10 @@ pub struct PersonDetection {
     pub heading: Option<f64>,
     /// The detector's confidence, in [0, 1].
     pub score: f64,
+    /// How the person looks, as a network for re-identification writes it: a direction of any number of
+    /// dimensions, the same for all cameras of an instance. Empty where there is none.
+    #[serde(default)]
+    pub appearance: Vec<f32>,
 }
 
 /// One object in one image.

@@ -110,6 +110,7 @@ fn frames(time: Time, people: &[Isometry2<f64>], chance: &mut Chance) -> Vec<Cam
                     position: Point2::from(local.translation.vector + noise),
                     heading: Some(local.rotation.angle() + normal(chance) * TURN),
                     score: 0.9,
+                    appearance: Vec::new(),
                 });
             }
         }
@@ -119,6 +120,7 @@ fn frames(time: Time, people: &[Isometry2<f64>], chance: &mut Chance) -> Vec<Cam
                 position: Point2::new(direction.cos() * distance, direction.sin() * distance),
                 heading: Some(chance.share() * TAU),
                 score: 0.6,
+                appearance: Vec::new(),
             });
         }
         frames.push(CameraFrame {

@@ -24,6 +24,7 @@ impl Config {
             velocity_decay,
             greatest_spread,
             confirmation_looks,
+            appearance: Appearances { spread, .. },
             ..
         } = self.tracking;
         let positive = [
@@ -33,6 +34,7 @@ impl Config {
             clutter_density,
             velocity_decay,
             greatest_spread,
+            spread,
         ];
         if !positive
             .iter()
@@ -158,6 +160,43 @@ pub struct Tracking {
     pub handover_limit: f64,
     /// Frames older than the newest taken in by more than this are refused, s.
     pub greatest_delay: f64,
+    /// What people look like, where detections tell.
+    pub appearance: Appearances,
+}
+
+/// How looks tell people apart; `human_observer/appearance.rs` states the law. The defaults lie between what
+/// networks for re-identification give for one person and for two.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Appearances {
+    /// Similarity of two images of one person, on average ...
+    pub same: f64,
+    /// ... and of two people.
+    pub other: f64,
+    /// Standard deviation of both.
+    pub spread: f64,
+    /// Somebody whose track is over is found again by looks at least so similar ...
+    pub at_least: f64,
+    /// ... and by so much more similar than the second most similar.
+    pub margin: f64,
+    /// Looks are remembered for so long since last seen, s ...
+    pub remembered: f64,
+    /// ... and those of so many people.
+    pub most_people: usize,
+}
+
+impl Default for Appearances {
+    fn default() -> Self {
+        Self {
+            same: 0.75,
+            other: 0.3,
+            spread: 0.15,
+            at_least: 0.65,
+            margin: 0.1,
+            remembered: 3600.0,
+            most_people: 256,
+        }
+    }
 }
 
 impl Tracking {
@@ -202,6 +241,7 @@ impl Default for Tracking {
             handover_speed: 1.0,
             handover_limit: 3.0,
             greatest_delay: 0.5,
+            appearance: Appearances::default(),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Who is who: when a track becomes a person, when somebody lost is found again, and when two people
 //! are one. A number is handed on or dropped here, never given a second time.
 
+use super::appearance::{RUNNING, SURE};
 use super::{Observer, Track};
 use crate::perception::FloorPlan;
 use dsr::Time;
@@ -30,6 +31,8 @@ impl Observer {
                 self.tracks[newcomer].take_identity(&other);
                 self.tracks[lost].id = None;
                 found.push(lost);
+            } else if let Some(id) = self.known_by_looks(newcomer) {
+                self.tracks[newcomer].id = Some(id);
             } else {
                 self.tracks[newcomer].id = Some(self.next_id);
                 self.next_id += 1;
@@ -39,6 +42,14 @@ impl Observer {
         for index in found.into_iter().rev() {
             self.tracks.remove(index);
         }
+    }
+
+    /// Somebody whose track is over and whose looks are the newcomer's.
+    fn known_by_looks(&mut self, newcomer: usize) -> Option<u64> {
+        let new = &self.tracks[newcomer];
+        let (looks, place) = (new.appearance.as_ref()?, new.position());
+        self.gallery
+            .find(looks, new.born, place, &self.config.appearance)
     }
 
     /// Somebody not seen since the newcomer was first seen, who can have got there.
@@ -54,14 +65,21 @@ impl Observer {
             let distance = track.distance_to(new.position());
             // Where one leaves and another comes by the same door, they face opposite ways.
             let turned = gap < config.remembered && track.faces_away_from(new);
-            let reachable = lost
-                && distance <= reach.min(config.handover_limit)
+            let near = distance <= reach.min(config.handover_limit)
                 && !turned
                 && !plan.wall_between(track.position(), new.position());
-            reachable.then_some((distance, track.id, index))
+            let unlike = track.unlike(new.appearance.as_ref(), config);
+            // Who looks so much like it may have gone round the corner.
+            let known = unlike <= -SURE && distance <= RUNNING * gap;
+            let found = lost && unlike <= 0.0 && (near || known);
+            found.then_some((unlike, distance, track.id, index))
         });
-        let nearest = candidates.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        nearest.map(|(_, _, index)| index)
+        // The likest, without looks the nearest.
+        let best = candidates.min_by(|a, b| {
+            let by_place = a.1.total_cmp(&b.1).then(a.2.cmp(&b.2));
+            a.0.total_cmp(&b.0).then(by_place)
+        });
+        best.map(|(.., index)| index)
     }
 
     /// Merges people who stay closer than bodies can and are never seen apart in one image: the
@@ -117,7 +135,8 @@ impl Observer {
                     .into_iter()
                     .filter(|t| t.last_frame == self.frame)
                     .count();
-                if seen == 2 || (a.position() - b.position()).norm() > limit {
+                let unlike = a.unlike(b.appearance.as_ref(), &self.config) > 0.0;
+                if seen == 2 || unlike || (a.position() - b.position()).norm() > limit {
                     continue;
                 }
                 let pair = (*first.min(second), *first.max(second));

@@ -37,7 +37,7 @@ impl Observer {
             }
         }
         for (sighting, _) in sightings.iter().zip(&taken).filter(|(_, taken)| !**taken) {
-            self.tracks.push(Track::new(*sighting, self.frame, config));
+            self.tracks.push(Track::new(sighting, self.frame, config));
         }
         for track in &mut self.tracks {
             if track.id.is_none() && track.hits() >= config.nearest.hits {

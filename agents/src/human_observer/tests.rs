@@ -2,6 +2,7 @@
 //! one false detection a second and camera.
 
 mod binding;
+mod looks;
 mod relating;
 mod tracking;
 

@@ -1,6 +1,7 @@
 //! One track: a constant-velocity Kalman filter, a heading, and the evidence for and against
 //! somebody being there. The covariance stays symmetric and positive definite (Joseph form).
 
+use super::appearance::{self, Appearance};
 use super::config::Tracking;
 use super::scene::TrackedPerson;
 use crate::perception::{HeadingEstimate, difference};
@@ -28,15 +29,18 @@ pub(super) struct Track {
     pub(super) existence: f64,
     /// Seconds that cameras looked and saw nobody since last seen, summed over the cameras.
     watched: f64,
+    /// What the person looks like, where a detector told.
+    pub(super) appearance: Option<Appearance>,
 }
 
 /// A detection in the world frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Sighting {
     pub(super) time: Time,
     pub(super) position: Point2<f64>,
     pub(super) heading: Option<f64>,
     pub(super) score: f64,
+    pub(super) appearance: Option<Appearance>,
 }
 
 /// How far a sighting lies from a track's prediction, and how far it may.
@@ -47,6 +51,8 @@ pub(super) struct Innovation {
     inverse: Matrix2<f64>,
     /// Squared deviation of the heading in standard deviations, at most `HEADING_LIMIT`.
     heading: f64,
+    /// What the looks say against it.
+    appearance: f64,
 }
 
 /// Beyond three standard deviations a heading counts no further: detectors turn people round.
@@ -59,14 +65,14 @@ impl Innovation {
     }
 
     /// Twice the negative logarithm of the residual's density, less 2 ln(2 pi), and what speaks
-    /// against it by the heading: two people who pass close by differ in little else.
+    /// against it by heading and looks: two people who pass close by differ in little else.
     pub(super) fn cost(&self) -> f64 {
-        self.distance() + self.covariance.determinant().ln() + self.heading
+        self.distance() + self.covariance.determinant().ln() + self.heading + self.appearance
     }
 }
 
 impl Track {
-    pub(super) fn new(sighting: Sighting, frame: u64, config: &Tracking) -> Self {
+    pub(super) fn new(sighting: &Sighting, frame: u64, config: &Tracking) -> Self {
         let position = config.position_noise.powi(2);
         let velocity = config.speed_spread.powi(2);
         Self {
@@ -87,6 +93,7 @@ impl Track {
             look_count: 1,
             existence: 0.5,
             watched: 0.0,
+            appearance: sighting.appearance.clone(),
         }
     }
 
@@ -97,8 +104,9 @@ impl Track {
             position: person.position(),
             heading: Some(person.pose.rotation.angle()),
             score: 1.0,
+            appearance: None,
         };
-        let mut track = Self::new(sighting, 0, config);
+        let mut track = Self::new(&sighting, 0, config);
         track.id = Some(person.id);
         track.existence = person.confidence.clamp(0.01, 0.999);
         track
@@ -219,7 +227,13 @@ impl Track {
             covariance,
             inverse: covariance.try_inverse()?,
             heading,
+            appearance: self.unlike(sighting.appearance.as_ref(), config),
         })
+    }
+
+    /// What speaks against its looks being those.
+    pub(super) fn unlike(&self, looks: Option<&Appearance>, config: &Tracking) -> f64 {
+        appearance::cost(self.appearance.as_ref(), looks, &config.appearance)
     }
 
     fn measurement(&self, sighting: &Sighting) -> Matrix2x4<f64> {
@@ -263,6 +277,12 @@ impl Track {
                 Some(heading) => heading.update(angle, noise.powi(2)),
                 None => self.heading = Some(HeadingEstimate::new(angle, noise.powi(2))),
             }
+        }
+
+        match (&mut self.appearance, &sighting.appearance) {
+            (Some(known), Some(image)) => known.take_in(image),
+            (known @ None, Some(image)) => *known = Some(image.clone()),
+            (_, None) => {}
         }
 
         self.last_seen = self.last_seen.max(sighting.time);
@@ -363,11 +383,19 @@ impl Track {
             .min((self.last_place - place).norm())
     }
 
+    /// Where it was seen last.
+    pub(super) fn last_place(&self) -> Point2<f64> {
+        self.last_place
+    }
+
     /// Takes the identity and the faith of `other`, who is the same person.
     pub(super) fn take_identity(&mut self, other: &Self) {
         self.id = other.id;
         self.born = self.born.min(other.born);
         self.existence = self.existence.max(other.existence);
         self.heading = self.heading.or(other.heading);
+        if self.appearance.is_none() {
+            self.appearance.clone_from(&other.appearance);
+        }
     }
 }

@@ -64,6 +64,7 @@ impl Run {
                     position: camera_from_world * body,
                     heading: None,
                     score: 0.9,
+                    appearance: Vec::new(),
                 });
                 frame.people.extend(people);
             }

@@ -93,6 +93,7 @@ pub(crate) fn look(
                 position: Point2::from(local.translation.vector + noise),
                 heading: Some(local.rotation.angle() + random.normal() * errors.heading),
                 score: 0.9,
+                appearance: Vec::new(),
             });
         }
     }
@@ -102,6 +103,7 @@ pub(crate) fn look(
             position: Point2::new(distance * angle.cos(), distance * angle.sin()),
             heading: Some(difference(random.uniform() * TAU, 0.0)),
             score: 0.6,
+            appearance: Vec::new(),
         });
     }
     frame

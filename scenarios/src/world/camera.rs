@@ -96,6 +96,7 @@ fn person_seen(camera: &Camera, person: &Body, random: &mut ChaCha8Rng) -> Perso
         position: position + noise(random, camera.position_noise),
         heading: Some(super::wrap(heading + normal(random, camera.heading_noise))),
         score: score(camera, position.coords.norm()),
+        appearance: Vec::new(),
     }
 }
 
@@ -131,6 +132,7 @@ fn person_imagined(camera: &Camera, random: &mut ChaCha8Rng) -> PersonDetection 
         position: Point2::new(direction.cos() * distance, direction.sin() * distance),
         heading: Some(random.random_range(-PI..PI)),
         score: random.random_range(0.3..0.8),
+        appearance: Vec::new(),
     }
 }
 

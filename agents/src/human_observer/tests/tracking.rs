@@ -267,11 +267,12 @@ fn late_frames_help_and_wrong_ones_are_refused_and_counted() {
         frame
     };
     let mut absurd = frame(5.0);
-    absurd.people = [f64::NAN, 900.0, f64::INFINITY]
+    absurd.people = [f64::NAN, 900.0, f64::INFINITY, 1.0]
         .map(|x| crate::messages::PersonDetection {
             position: Point2::new(x, 0.0),
             heading: None,
             score: 0.9,
+            appearance: vec![f32::NAN],
         })
         .to_vec();
     let mut lost = frame(5.0);
@@ -288,7 +289,8 @@ fn late_frames_help_and_wrong_ones_are_refused_and_counted() {
             late_frames: 1,
             repeated_frames: 1,
             absurd_frames: 2,
-            absurd_detections: 3
+            absurd_detections: 3,
+            absurd_appearances: 1
         }
     );
 }
@@ -349,6 +351,7 @@ fn somebody_seen_in_vain_is_not_brought_back_by_a_single_detection() {
             .inverse_transform_point(&Point2::new(1.1, 1.0)),
         heading: None,
         score: 0.9,
+        appearance: Vec::new(),
     }];
     let now = Time::from_seconds(2.7);
     let scene = run.observer.observe(now, &[frame], &run.surroundings);
