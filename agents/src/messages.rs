@@ -94,6 +94,8 @@ pub struct Odometry {
     pub world_from_robot: Isometry2<f64>,
     /// Forward speed, m/s.
     pub linear: f64,
+    /// Speed to the left, m/s; 0 of a differential base.
+    pub lateral: f64,
     /// Turning speed, rad/s, counter-clockwise.
     pub angular: f64,
 }
@@ -105,6 +107,8 @@ pub struct VelocityCommand {
     pub time: Time,
     /// Forward speed, m/s.
     pub linear: f64,
+    /// Speed to the left, m/s; 0 of a differential base.
+    pub lateral: f64,
     /// Turning speed, rad/s, counter-clockwise.
     pub angular: f64,
 }

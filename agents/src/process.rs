@@ -228,6 +228,7 @@ pub fn navigation(mut session: Session, begin: Begin) -> Result<(), ProcessError
         velocity.send(&VelocityCommand {
             time: last.time,
             linear: 0.0,
+            lateral: 0.0,
             angular: 0.0,
         })?;
     }

@@ -84,6 +84,7 @@ fn add_robot(graph: &mut Transaction, scenario: &Scenario) {
         attribute("radius", robot.radius),
         attribute("max_speed", robot.max_speed),
         attribute("max_turn", robot.max_turn),
+        attribute("base", robot.base.name()),
         attribute("velocity", [0.0, 0.0]),
     ];
     graph.create_node("robot", &robot.name, attributes);

@@ -28,7 +28,7 @@ use std::collections::BTreeMap;
 
 /// Heading changes are summed over the path resampled at this arc length, m.
 pub const CHC_STEP: f64 = 0.2;
-/// A robot whose forward speed is above this, m/s, counts as moving.
+/// A robot whose speed is above this, m/s, counts as moving.
 pub const MOVING: f64 = 0.05;
 
 /// All figures of one run.
@@ -303,7 +303,7 @@ fn tally(samples: &[&Truth], spaces: &[ObjectSpace]) -> (Tally, Tally) {
             .iter()
             .any(|space| space.is_in_use(now.time) && space.contains(place));
         all.add(zone, in_space, nanoseconds);
-        if now.velocity.x.abs() > MOVING {
+        if motion::speed(now).abs() > MOVING {
             moving.add(zone, in_space, nanoseconds);
         }
     }

@@ -25,6 +25,8 @@ pub struct Report {
     pub seed: u64,
     /// Whether the robot behaved socially.
     pub social: bool,
+    /// Which ways its base goes: `differential` or `omnidirectional`.
+    pub base: &'static str,
     /// Whether every mission succeeded.
     pub success: bool,
     /// Whether the time was up before a mission had ended.

@@ -26,6 +26,8 @@ pub use schedule::parse_schedule;
 pub(crate) use space::CLASSES;
 
 use agents::human_observer;
+pub use agents::navigation::control::Base;
+use agents::navigation::control::Limits;
 use agents::social_mapping::SocialConfig;
 use dsr::Time;
 use nalgebra::{Isometry2, Point2, Vector2};
@@ -171,7 +173,9 @@ pub struct Robot {
     pub pose: Isometry2<f64>,
     /// Radius of its footprint.
     pub radius: f64,
-    /// m/s, forward and backward.
+    /// Which ways its base goes.
+    pub base: Base,
+    /// m/s, whichever way.
     pub max_speed: f64,
     /// rad/s.
     pub max_turn: f64,
@@ -334,6 +338,20 @@ pub struct TracksFrame {
     pub offset: f64,
 }
 
+impl Robot {
+    /// What its base can do.
+    pub fn limits(&self) -> Limits {
+        Limits {
+            base: self.base,
+            radius: self.radius,
+            max_speed: self.max_speed,
+            max_turn: self.max_turn,
+            acceleration: self.max_acceleration,
+            turn_acceleration: self.max_turn_acceleration,
+        }
+    }
+}
+
 impl Default for Robot {
     /// A small differential robot at the origin.
     fn default() -> Self {
@@ -341,6 +359,7 @@ impl Default for Robot {
             name: "robot".to_owned(),
             pose: Isometry2::identity(),
             radius: 0.25,
+            base: Base::Differential,
             max_speed: 0.7,
             max_turn: 1.2,
             max_acceleration: 0.8,

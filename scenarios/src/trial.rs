@@ -14,7 +14,6 @@ use crate::metrics::mapped;
 use crate::scenario::{Scenario, Wall};
 use crate::tracks::Tracks;
 use crate::world::{Inputs as WorldInputs, Truth, World};
-use agents::navigation::control::Limits;
 use agents::navigation::map_age::MapState;
 use agents::navigation::navigator::{Config, Inputs, Navigator, Output, Status};
 use agents::navigation::people::Person;
@@ -125,13 +124,7 @@ impl Trial<'_> {
         let mut scene = self.scene();
         let mut driver = Driver::new(self.method, self.navigation);
         let robot = &scenario.robot;
-        let limits = Limits {
-            radius: robot.radius,
-            max_speed: robot.max_speed,
-            max_turn: robot.max_turn,
-            acceleration: robot.max_acceleration,
-            turn_acceleration: robot.max_turn_acceleration,
-        };
+        let limits = robot.limits();
         let mut samples = vec![world.truth()];
         let (mut scan, mut odometry, mut grid) = (None, None, None);
         let mut command = None;
@@ -282,6 +275,31 @@ mod tests {
         let last = drive.samples.last().unwrap().world_from_robot;
         assert!((last.translation.vector - Vector2::new(4.0, 6.0)).norm() < 0.3);
         assert_eq!(trial.drive().unwrap(), drive);
+    }
+
+    #[test]
+    fn an_omnidirectional_robot_gets_there_among_people_and_goes_sideways() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("corridor");
+        let mut scenario = Scenario::load(&folder).unwrap();
+        scenario.robot.base = crate::scenario::Base::Omnidirectional;
+        let trial = Trial {
+            scenario: &scenario,
+            seed: 1,
+            tracks: None,
+            unmapped: &[],
+            method: Method::Navigation,
+            social: true,
+            targets: vec![Target::Point(Point2::new(13.2, 1.5))],
+            navigation: Config::default(),
+            agenda_from: 0.0,
+        };
+        let drive = trial.drive().unwrap();
+        assert!(drive.arrived);
+        let samples = &drive.samples;
+        assert!(samples.iter().any(|sample| sample.lateral.abs() > 0.05));
+        let top = scenario.robot.max_speed + 1e-9;
+        assert!(samples.iter().all(|s| s.velocity.x.hypot(s.lateral) <= top));
+        assert_eq!(samples.last().unwrap().collisions.total(), 0);
     }
 
     #[test]

@@ -65,6 +65,8 @@ pub struct Truth {
     pub world_from_robot: Isometry2<f64>,
     /// The robot's forward speed, m/s, and turning speed, rad/s.
     pub velocity: Vector2<f64>,
+    /// Its speed to the left, m/s; 0 of a differential base.
+    pub lateral: f64,
     /// Everybody in the world.
     pub people: Vec<Body>,
     /// Collisions of the robot so far.
@@ -219,6 +221,7 @@ impl World {
             time: self.now,
             world_from_robot: self.base.pose,
             velocity: self.base.velocity,
+            lateral: self.base.lateral,
             people: self.crowd.bodies().to_vec(),
             collisions: self.base.collisions,
         }
@@ -231,10 +234,10 @@ impl World {
         if let Some(command) = inputs.velocity {
             self.base.take(before, command);
         }
-        let heading = self.base.pose.rotation * Vector2::x();
         let robot = Disc {
             position: self.base.position(),
-            velocity: heading * self.base.velocity.x,
+            velocity: self.base.pose.rotation
+                * Vector2::new(self.base.velocity.x, self.base.lateral),
             radius: self.scenario.robot.radius,
             is_robot: true,
         };
@@ -304,6 +307,7 @@ impl World {
                 time: self.now,
                 world_from_robot: self.drift.measure(&self.base.pose, since, random),
                 linear: self.base.velocity.x,
+                lateral: self.base.lateral,
                 angular: self.base.velocity.y,
             }
         })

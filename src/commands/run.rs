@@ -153,6 +153,7 @@ impl Plan<'_> {
             scenario: self.scenario.name.clone(),
             seed: arguments.seed,
             social: !arguments.no_social,
+            base: self.scenario.robot.base.name(),
             success: recording.succeeded(),
             timed_out: mission.as_ref().is_some_and(MissionReport::timed_out),
             shortest_path: shortest(recording),

@@ -404,10 +404,7 @@ impl Rollout {
             Manoeuvre::Along(share) => self.along(robot, scene, share * top),
             Manoeuvre::WaitThenGo(wait) if time < wait - 0.5 * STEP => {
                 // Turning toward the way on is no harm and saves time.
-                Motion {
-                    linear: 0.0,
-                    ..self.along(robot, scene, top)
-                }
+                Motion::new(0.0, self.along(robot, scene, top).angular)
             }
             Manoeuvre::WaitThenGo(_) => self.along(robot, scene, top),
             Manoeuvre::GoThenWait(go) if time < go - 0.5 * STEP => self.along(robot, scene, top),

@@ -1,30 +1,92 @@
-//! Control of a differential base along a line (paper TD 5.3). This file guarantees that no command
+//! Control of a differential or omnidirectional base along a line (paper TD 5.3). This file guarantees that no command
 //! exceeds the base's limits, and that the robot can stop before whatever its laser sees, whatever
 //! the other parts of the navigation believe.
 
 use super::obstacles::hits;
 use crate::messages::LaserScan;
-use nalgebra::{Isometry2, Point2, Vector2, distance};
+use nalgebra::{Isometry2, Point2, Rotation2, Vector2, distance};
 
-/// How a differential base moves: forward m/s, turning rad/s counter-clockwise.
+/// How a base moves, in its own frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Motion {
     /// Forward speed, m/s; negative backwards.
     pub linear: f64,
+    /// Speed to the left, m/s; 0 of a differential base.
+    pub lateral: f64,
     /// Turning speed, rad/s, counter-clockwise.
     pub angular: f64,
+}
+
+impl Motion {
+    /// Forwards and turning.
+    pub const fn new(linear: f64, angular: f64) -> Self {
+        Self {
+            linear,
+            lateral: 0.0,
+            angular,
+        }
+    }
+
+    /// How fast the centre moves, whichever way, m/s.
+    pub fn speed(&self) -> f64 {
+        self.linear.hypot(self.lateral)
+    }
+
+    /// The same way at `most` m/s at most.
+    #[must_use]
+    pub fn capped(self, most: f64) -> Self {
+        if self.lateral == 0.0 {
+            return Self::new(self.linear.clamp(-most, most), self.angular);
+        }
+        let way = Vector2::new(self.linear, self.lateral).cap_magnitude(most);
+        Self {
+            linear: way.x,
+            lateral: way.y,
+            ..self
+        }
+    }
+}
+
+/// How a base can move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Base {
+    /// Forwards, backwards and turning.
+    #[default]
+    Differential,
+    /// Also sideways.
+    Omnidirectional,
+}
+
+impl Base {
+    /// All bases.
+    pub const ALL: [Self; 2] = [Self::Differential, Self::Omnidirectional];
+
+    /// Its name in scenario files, in the graph and in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Differential => "differential",
+            Self::Omnidirectional => "omnidirectional",
+        }
+    }
+
+    /// The base of that name.
+    pub fn find(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|base| base.name() == name)
+    }
 }
 
 /// What the base can do.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
+    /// Which ways it goes.
+    pub base: Base,
     /// Radius of the footprint, metres.
     pub radius: f64,
-    /// Largest forward speed, m/s.
+    /// Largest speed, m/s, whichever way.
     pub max_speed: f64,
     /// Largest turning speed, rad/s.
     pub max_turn: f64,
-    /// Largest change of the forward speed, m/s^2, speeding up and braking alike.
+    /// Largest change of the velocity, m/s^2, speeding up and braking alike.
     pub acceleration: f64,
     /// Largest change of the turning speed, rad/s^2.
     pub turn_acceleration: f64,
@@ -34,6 +96,7 @@ impl Default for Limits {
     /// The authors' robot (READING.md item 14); the accelerations are ours.
     fn default() -> Self {
         Self {
+            base: Base::Differential,
             radius: 0.25,
             max_speed: 0.3,
             max_turn: 0.6,
@@ -50,14 +113,23 @@ impl Limits {
             let wanted = wanted.clamp(-top, top);
             wanted.clamp(now - change * seconds, now + change * seconds)
         };
+        let angular = toward(
+            now.angular,
+            wanted.angular,
+            self.max_turn,
+            self.turn_acceleration,
+        );
+        if self.base == Base::Differential {
+            let linear = toward(now.linear, wanted.linear, self.max_speed, self.acceleration);
+            return Motion::new(linear, angular);
+        }
+        let moving = |motion: Motion| Vector2::new(motion.linear, motion.lateral);
+        let change = moving(wanted.capped(self.max_speed)) - moving(now);
+        let velocity = moving(now) + change.cap_magnitude(self.acceleration * seconds);
         Motion {
-            linear: toward(now.linear, wanted.linear, self.max_speed, self.acceleration),
-            angular: toward(
-                now.angular,
-                wanted.angular,
-                self.max_turn,
-                self.turn_acceleration,
-            ),
+            linear: velocity.x,
+            lateral: velocity.y,
+            angular,
         }
     }
 }
@@ -86,8 +158,10 @@ impl Unicycle {
     pub fn advanced(&self, motion: Motion, seconds: f64) -> Self {
         // At the mean heading: exact in direction, and short by (turn^2 / 24) of the arc.
         let (sin, cos) = (self.heading + 0.5 * motion.angular * seconds).sin_cos();
+        let (ahead, left) = (Vector2::new(cos, sin), Vector2::new(-sin, cos));
+        let velocity = ahead * motion.linear + left * motion.lateral;
         Self {
-            position: self.position + Vector2::new(cos, sin) * (motion.linear * seconds),
+            position: self.position + velocity * seconds,
             heading: self.heading + motion.angular * seconds,
             motion,
         }
@@ -111,7 +185,8 @@ pub fn wrapped(angle: f64) -> f64 {
 
 /// What the robot should do to follow `line` (from itself to the goal) at up to `speed` m/s: aim at
 /// a point ahead, slow down in turns and turn in place above [`TURN_IN_PLACE`], and brake so that
-/// it stands at the end. `backwards` drives with the rear ahead. Limits apply afterwards.
+/// it stands at the end. `backwards` drives with the rear ahead. An omnidirectional base goes straight at
+/// the point and turns to face its way meanwhile, or backwards keeps its heading. Limits apply afterwards.
 ///
 /// Returns no motion where the line has no length.
 pub fn follow(
@@ -135,14 +210,19 @@ pub fn follow(
         robot.heading
     };
     let error = wrapped(to_aim.y.atan2(to_aim.x) - facing);
-    let straight = (1.0 - error.abs() / TURN_IN_PLACE).max(0.0);
     // Half the deceleration leaves room for the delay of the loop.
     let braking = (limits.acceleration * remaining).sqrt();
-    let linear = speed.min(braking) * straight;
-    Motion {
-        linear: if backwards { -linear } else { linear },
-        angular: TURN_GAIN * error,
+    if limits.base == Base::Omnidirectional {
+        let way = Rotation2::new(-robot.heading) * to_aim.normalize() * speed.min(braking);
+        return Motion {
+            linear: way.x,
+            lateral: way.y,
+            angular: if backwards { 0.0 } else { TURN_GAIN * error },
+        };
     }
+    let straight = (1.0 - error.abs() / TURN_IN_PLACE).max(0.0);
+    let linear = speed.min(braking) * straight;
+    Motion::new(if backwards { -linear } else { linear }, TURN_GAIN * error)
 }
 
 /// The point `reach` metres along `line`, and how long the line is up to `horizon` metres.
@@ -179,10 +259,7 @@ pub fn turn_to(robot: &Unicycle, heading: f64, tolerance: f64) -> Motion {
     } else {
         TURN_GAIN * error
     };
-    Motion {
-        linear: 0.0,
-        angular,
-    }
+    Motion::new(0.0, angular)
 }
 
 /// How fast the robot passes right beside somebody who stands, m/s, and from which gap between the two
@@ -228,31 +305,33 @@ impl Guard {
     /// everything the laser sees in its way; both at least 0. Turning in place is always allowed, and
     /// so is driving away from what is already too close.
     pub fn allowed(&self, scan: &LaserScan, limits: &Limits) -> (f64, f64) {
+        let along = |way| self.allowed_along(scan, limits, way);
+        (along(Vector2::x()), along(-Vector2::x()))
+    }
+
+    /// The same along `way`, a unit vector in the robot's frame.
+    fn allowed_along(&self, scan: &LaserScan, limits: &Limits, way: Vector2<f64>) -> f64 {
         let half_width = limits.radius + self.side_margin;
         let half_length = limits.radius + self.margin;
-        let (mut forwards, mut backwards) = (f64::INFINITY, f64::INFINITY);
+        let mut allowed = f64::INFINITY;
         for hit in hits(scan) {
-            let aside = hit.y.abs() / half_width;
-            if aside >= 1.0 {
+            let (ahead, left) = (hit.coords.dot(&way), way.perp(&hit.coords));
+            let aside = left.abs() / half_width;
+            if aside >= 1.0 || ahead < 0.0 {
                 continue;
             }
             // What must stay empty is an ellipse, longer ahead than it is wide.
-            let room = hit.x.abs() - half_length * (1.0 - aside * aside).sqrt();
+            let room = ahead - half_length * (1.0 - aside * aside).sqrt();
             let speed = self.speed_within(room, limits);
             // Driving straight on does not meet what lies outside the robot's own width.
-            let speed = if hit.y.abs() < limits.radius {
+            let speed = if left.abs() < limits.radius {
                 speed
             } else {
                 speed.max(CREEP)
             };
-            let way = if hit.x >= 0.0 {
-                &mut forwards
-            } else {
-                &mut backwards
-            };
-            *way = speed.min(*way);
+            allowed = speed.min(allowed);
         }
-        (forwards, backwards)
+        allowed
     }
 
     /// The speed v at which delay and braking take `room` metres: v delay + v^2 / 2a = room.
@@ -266,11 +345,10 @@ impl Guard {
 
     /// `wanted`, slowed to what [`Guard::allowed`] says.
     pub fn slowed(&self, wanted: Motion, scan: &LaserScan, limits: &Limits) -> Motion {
-        let (forwards, backwards) = self.allowed(scan, limits);
-        Motion {
-            linear: wanted.linear.clamp(-backwards, forwards),
-            ..wanted
-        }
+        let way = Vector2::new(wanted.linear, wanted.lateral).try_normalize(1e-9);
+        way.map_or(wanted, |way| {
+            wanted.capped(self.allowed_along(scan, limits, way))
+        })
     }
 }
 

@@ -6,11 +6,11 @@ mod people;
 mod read;
 
 pub use self::read::{
-    AGENT, MAP_HOLD_AFTER, MAP_SLOW_AFTER, MAP_STATE, StepError, TALKING_DISTANCE,
+    AGENT, BASE, MAP_HOLD_AFTER, MAP_SLOW_AFTER, MAP_STATE, StepError, TALKING_DISTANCE,
 };
 
 use self::read::{Step, Work, World};
-use super::control::wrapped;
+use super::control::{Base, wrapped};
 use super::map_age::MapState;
 use super::navigator::{Config, Inputs, Navigator, Output, Status};
 use super::target::{INSIDE, Region, Target, Task};
@@ -124,6 +124,7 @@ impl Navigation {
                 command: VelocityCommand {
                     time: now,
                     linear: 0.0,
+                    lateral: 0.0,
                     angular: 0.0,
                 },
                 speech: None,
@@ -287,12 +288,14 @@ impl Navigation {
                     attributes: vec![("transform".to_owned(), Value::Pose(planar_pose(&pose)))],
                 });
             }
-            let told = robot
-                .velocity
-                .unwrap_or_else(|| nalgebra::Vector2::repeat(f64::INFINITY));
-            let moving = [odometry.linear, odometry.angular];
-            if (told.x - moving[0]).abs() > CHANGED || (told.y - moving[1]).abs() > CHANGED {
-                transaction.set(robot.id, "velocity", Value::Vector(moving.to_vec()));
+            let mut moving = vec![odometry.linear, odometry.angular];
+            if robot.limits.base == Base::Omnidirectional {
+                moving.push(odometry.lateral);
+            }
+            let told = &robot.velocity;
+            let changed = |(new, told): (&f64, &f64)| (new - told).abs() > CHANGED;
+            if moving.len() != told.len() || moving.iter().zip(told).any(changed) {
+                transaction.set(robot.id, "velocity", Value::Vector(moving));
             }
         }
         if robot.map_state.as_deref() != Some(world.map.name())

@@ -182,10 +182,7 @@ struct View<'a> {
 /// A wanted motion, and how the task stands with it.
 type Decision = (Motion, Status);
 
-const STAND: Motion = Motion {
-    linear: 0.0,
-    angular: 0.0,
-};
+const STAND: Motion = Motion::new(0.0, 0.0);
 
 impl Navigator {
     /// A navigator without a task.
@@ -251,6 +248,7 @@ impl Navigator {
         let command = VelocityCommand {
             time: now,
             linear: motion.linear,
+            lateral: motion.lateral,
             angular: motion.angular,
         };
         self.last = Some(command);
@@ -279,6 +277,7 @@ impl Navigator {
         let command = VelocityCommand {
             time: now,
             linear: motion.linear,
+            lateral: motion.lateral,
             angular: motion.angular,
         };
         self.last = Some(command);
@@ -301,10 +300,12 @@ impl Navigator {
         let moving = match self.last {
             Some(last) if fresh(last.time) => Motion {
                 linear: last.linear,
+                lateral: last.lateral,
                 angular: last.angular,
             },
             _ => Motion {
                 linear: odometry.linear,
+                lateral: odometry.lateral,
                 angular: odometry.angular,
             },
         };

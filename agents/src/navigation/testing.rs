@@ -14,6 +14,7 @@ pub(crate) fn odometry(now: Time, robot: &Unicycle) -> Odometry {
         time: now,
         world_from_robot: robot.world_from_robot(),
         linear: robot.motion.linear,
+        lateral: robot.motion.lateral,
         angular: robot.motion.angular,
     }
 }

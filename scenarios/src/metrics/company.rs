@@ -110,7 +110,7 @@ pub(super) fn company(samples: &[&Truth], robot_radius: f64) -> Option<Company> 
 /// that they have; infinite where that will not be.
 fn time_to_collision(sample: &Truth, robot_radius: f64) -> f64 {
     let heading = sample.world_from_robot.rotation;
-    let velocity = heading * nalgebra::Vector2::new(sample.velocity.x, 0.0);
+    let velocity = heading * nalgebra::Vector2::new(sample.velocity.x, sample.lateral);
     let times = sample.people.iter().filter_map(|body| {
         let (apart, closing) = (body.position - robot(sample), body.velocity - velocity);
         let reach = body.radius + robot_radius;

@@ -1,6 +1,6 @@
 //! How evenly the robot moved. This file owns the figures of speed, acceleration and jerk: mean
-//! magnitudes over time and greatest ones, by differences from sample to sample of the forward speed
-//! that the base had, and not of what it was told.
+//! magnitudes over time and greatest ones, by differences from sample to sample of the speed that the
+//! base had, and not of what it was told.
 
 use super::{MOVING, Truth};
 use serde::Serialize;
@@ -12,7 +12,7 @@ pub const TURNING: f64 = 0.05;
 /// Navigation Algorithms", 2023, table 3: velocity, acceleration and jerk based, stalled time).
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Motion {
-    /// Mean of the forward speed's magnitude, m/s.
+    /// Mean of the speed's magnitude, m/s: forwards, and of an omnidirectional base whichever way.
     pub mean_speed: f64,
     /// Its greatest, m/s.
     pub max_speed: f64,
@@ -53,18 +53,25 @@ fn magnitudes(of: &Series) -> (f64, f64) {
     (if time > 0.0 { sum / time } else { greatest }, greatest)
 }
 
+/// Forward speed, negative backwards; of a robot that goes sideways, too, how fast its centre moves.
+pub(super) fn speed(sample: &Truth) -> f64 {
+    if sample.lateral == 0.0 {
+        sample.velocity.x
+    } else {
+        sample.velocity.x.hypot(sample.lateral)
+    }
+}
+
 /// Of samples in order; `None` where no time passed.
 pub(super) fn motion(samples: &[&Truth]) -> Option<Motion> {
     let (first, last) = (samples.first()?, samples.last()?);
-    let sound = samples
-        .iter()
-        .filter(|sample| sample.velocity.x.is_finite());
+    let sound = samples.iter().filter(|sample| speed(sample).is_finite());
     let mut speeds: Series = Vec::new();
     for sample in sound {
         let time = sample.time.since(first.time);
         // Of samples of one time the last counts.
         speeds.pop_if(|(known, _)| time <= *known);
-        speeds.push((time, sample.velocity.x));
+        speeds.push((time, speed(sample)));
     }
     if last.time <= first.time || speeds.len() < 2 {
         return None;
@@ -73,8 +80,7 @@ pub(super) fn motion(samples: &[&Truth]) -> Option<Motion> {
     let (mean_speed, max_speed) = magnitudes(&speeds);
     let (mean_acceleration, max_acceleration) = magnitudes(&accelerations);
     let (mean_jerk, max_jerk) = magnitudes(&change(&accelerations));
-    let stands =
-        |sample: &Truth| sample.velocity.x.abs() < MOVING && sample.velocity.y.abs() < TURNING;
+    let stands = |sample: &Truth| speed(sample).abs() < MOVING && sample.velocity.y.abs() < TURNING;
     let stalled = samples
         .windows(2)
         .filter(|pair| stands(pair[0]))

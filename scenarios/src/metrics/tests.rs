@@ -19,6 +19,7 @@ fn sample(seconds: f64, x: f64, y: f64, speed: f64) -> Truth {
         time: at(seconds),
         world_from_robot: Isometry2::new(Vector2::new(x, y), 0.0),
         velocity: Vector2::new(speed, 0.0),
+        lateral: 0.0,
         people: Vec::new(),
         collisions: Collisions::default(),
     }

@@ -64,6 +64,7 @@ fn run(scenario: &Scenario, y: f64, people: usize) -> Vec<Truth> {
                 time: scenario.start + t,
                 world_from_robot: Isometry2::new(Vector2::new(1.0 + t / 3.0, y), 0.0),
                 velocity: Vector2::new(1.0 / 3.0, 0.0),
+                lateral: 0.0,
                 people: (0..people).map(walker).collect(),
                 collisions: Collisions {
                     walls: u64::from(i >= 150),

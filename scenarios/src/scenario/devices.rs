@@ -2,7 +2,8 @@
 
 use super::file::{Kind, Names, pose};
 use super::reader::{Bound, Table};
-use super::{Camera, Laser, Localisation, Robot};
+use super::{Base, Camera, Laser, Localisation, ProblemKind, Robot};
+use agents::names::suggest;
 
 pub(super) fn cameras(scenario: &Table<'_>, names: &mut Names<'_>) -> Vec<Camera> {
     let mut cameras = Vec::new();
@@ -21,6 +22,22 @@ pub(super) fn cameras(scenario: &Table<'_>, names: &mut Names<'_>) -> Vec<Camera
         table.close();
     }
     cameras
+}
+
+fn base(table: &Table<'_>) -> Base {
+    let Some(name) = table.get::<String>("base") else {
+        return Base::default();
+    };
+    Base::find(&name.value).unwrap_or_else(|| {
+        let help = suggest(&name.value, Base::ALL.map(Base::name));
+        let kind = ProblemKind::UnknownName {
+            kind: "base",
+            name: name.value,
+            help,
+        };
+        table.problems.add(kind, name.span);
+        Base::default()
+    })
 }
 
 pub(super) fn robot(scenario: &Table<'_>, names: &mut Names<'_>) -> Robot {
@@ -72,6 +89,7 @@ pub(super) fn robot(scenario: &Table<'_>, names: &mut Names<'_>) -> Robot {
         name,
         pose: pose(&table),
         radius: table.number("radius", Bound::Positive, default.radius),
+        base: base(&table),
         max_speed: table.number("max_speed", Bound::Positive, default.max_speed),
         max_turn: table.number("max_turn", Bound::Positive, default.max_turn),
         max_acceleration: table.number(

@@ -456,3 +456,23 @@ proptest::proptest! {
         }
     }
 }
+
+#[test]
+fn a_base_goes_by_its_name_and_is_differential_where_none_is_given() {
+    let read = |line: &str| {
+        let text = format!(
+            "name = \"hall\"\nstart = \"2026-03-02T10:00:00\"\nduration = 9.0\n[[room]]\nname = \"hall\"\n\
+             polygon = [[0, 0], [4, 0], [4, 4], [0, 4]]\n[robot]\npose = [2, 2, 0]\n{line}\n"
+        );
+        Scenario::parse("scenario.toml", &text, &|_| Ok(String::new()))
+    };
+    assert_eq!(
+        read("").unwrap().robot.base,
+        crate::scenario::Base::Differential
+    );
+    let omni = read("base = \"omnidirectional\"").unwrap();
+    assert_eq!(omni.robot.base, crate::scenario::Base::Omnidirectional);
+    let invalid = read("base = \"omnidirectionel\"").unwrap_err();
+    let told = format!("{:?}", miette::Report::new(*invalid));
+    assert!(told.contains("did you mean `omnidirectional`"), "{told}");
+}

@@ -12,7 +12,7 @@ use agents::navigation::obstacles::{Obstacles, world_hits};
 use agents::navigation::path::{Request, Search};
 use agents::navigation::target::Target;
 use dsr::Time;
-use nalgebra::{Point2, Vector2, distance};
+use nalgebra::{Point2, Rotation2, Vector2, distance};
 
 /// How the robot finds its way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -89,6 +89,7 @@ impl Plain {
         let command = VelocityCommand {
             time: now,
             linear: motion.linear,
+            lateral: motion.lateral,
             angular: motion.angular,
         };
         self.last = Some(command);
@@ -108,6 +109,7 @@ impl Plain {
             heading: odometry.world_from_robot.rotation.angle(),
             motion: self.last.map_or_else(Motion::default, |last| Motion {
                 linear: last.linear,
+                lateral: last.lateral,
                 angular: last.angular,
             }),
         };
@@ -203,10 +205,11 @@ impl Plain {
             .or(self.path.get(1))
             .unwrap_or(&goal);
         let braking = (limits.acceleration * distance(&goal, &robot.position)).sqrt();
-        let heading = Vector2::new(robot.heading.cos(), robot.heading.sin());
+        let turned = Rotation2::new(robot.heading);
+        let heading = turned * Vector2::x();
         let agent = Agent {
             position: robot.position,
-            velocity: heading * robot.motion.linear,
+            velocity: turned * Vector2::new(robot.motion.linear, robot.motion.lateral),
             radius: limits.radius,
             wanted: (ahead - robot.position)
                 .try_normalize(1e-9)

@@ -1,12 +1,13 @@
-//! The robot's body and differential drive. It never moves deeper into anything solid, however
+//! The robot's body and drive. It never moves deeper into anything solid, however
 //! long the step, and counts each contact once.
 
 use super::obstacles::{Obstacles, distance_to_segment};
 use super::{Body, Collisions};
 use crate::scenario::Robot;
 use agents::messages::VelocityCommand;
+use agents::navigation::control::Motion;
 use dsr::Time;
-use nalgebra::{Isometry2, Point2, Vector2};
+use nalgebra::{Isometry2, Point2, Rotation2, Vector2};
 
 /// The base stops by itself when no command came for this long, s.
 const COMMAND_TIMEOUT: f64 = 0.5;
@@ -26,8 +27,10 @@ pub(super) struct Base {
     pub(super) pose: Isometry2<f64>,
     /// Forward speed, m/s, and turning speed, rad/s.
     pub(super) velocity: Vector2<f64>,
+    /// Speed to the left, m/s.
+    pub(super) lateral: f64,
     pub(super) collisions: Collisions,
-    command: Option<(Time, Vector2<f64>)>,
+    command: Option<(Time, Motion)>,
     touching: Vec<Contact>,
 }
 
@@ -36,6 +39,7 @@ impl Base {
         Self {
             pose: robot.pose,
             velocity: Vector2::zeros(),
+            lateral: 0.0,
             collisions: Collisions::default(),
             command: None,
             touching: Vec::new(),
@@ -48,8 +52,22 @@ impl Base {
 
     /// Takes a command that arrived at `now`. One that is no number is not taken.
     pub(super) fn take(&mut self, now: Time, command: VelocityCommand) {
-        if command.linear.is_finite() && command.angular.is_finite() {
-            self.command = Some((now, Vector2::new(command.linear, command.angular)));
+        let VelocityCommand {
+            linear,
+            lateral,
+            angular,
+            ..
+        } = command;
+        if [linear, lateral, angular]
+            .iter()
+            .all(|speed| speed.is_finite())
+        {
+            let motion = Motion {
+                linear,
+                lateral,
+                angular,
+            };
+            self.command = Some((now, motion));
         }
     }
 
@@ -65,32 +83,27 @@ impl Base {
         let fresh = self
             .command
             .filter(|(came, _)| now.since(*came) <= COMMAND_TIMEOUT + 1e-9);
-        let wanted = fresh.map_or_else(Vector2::zeros, |(_, wanted)| wanted);
-        let approach = |from: f64, to: f64, limit: f64, rate: f64| {
-            from + (to.clamp(-limit, limit) - from).clamp(-rate * dt, rate * dt)
+        let wanted = fresh.map_or_else(Motion::default, |(_, wanted)| wanted);
+        let now = Motion {
+            linear: self.velocity.x,
+            lateral: self.lateral,
+            angular: self.velocity.y,
         };
-        let [linear, angular] = [wanted.x, wanted.y];
-        self.velocity = Vector2::new(
-            approach(
-                self.velocity.x,
-                linear,
-                robot.max_speed,
-                robot.max_acceleration,
-            ),
-            approach(
-                self.velocity.y,
-                angular,
-                robot.max_turn,
-                robot.max_turn_acceleration,
-            ),
-        );
+        let moves = robot.limits().reachable(now, wanted, dt);
+        self.velocity = Vector2::new(moves.linear, moves.angular);
+        self.lateral = moves.lateral;
         // Short enough that a step cannot carry the body across anything.
-        let parts = (self.velocity.x.abs() * dt / (robot.radius * 0.25))
-            .ceil()
-            .max(1.0);
+        let parts = (moves.speed() * dt / (robot.radius * 0.25)).ceil().max(1.0);
         let mut blocked = Vec::new();
         for _ in 0..parts as usize {
-            let move_by = |part: f64| advance(&self.pose, self.velocity, dt / parts * part);
+            let move_by = |part: f64| {
+                let moves = Motion {
+                    linear: self.velocity.x,
+                    lateral: self.lateral,
+                    ..moves
+                };
+                advance(&self.pose, moves, dt / parts * part)
+            };
             let meets = |part: f64| {
                 let to = Point2::from(move_by(part).translation.vector);
                 deeper(robot.radius, self.position(), to, obstacles, people)
@@ -113,7 +126,7 @@ impl Base {
             let turned = move_by(1.0).rotation;
             self.pose = move_by(free);
             self.pose.rotation = turned;
-            self.velocity.x = 0.0;
+            (self.velocity.x, self.lateral) = (0.0, 0.0);
             blocked.extend(into);
         }
         self.count(robot.radius, blocked, obstacles, people);
@@ -157,17 +170,17 @@ impl Base {
 }
 
 /// The pose after moving at constant speeds (an arc) for `dt` seconds.
-fn advance(pose: &Isometry2<f64>, velocity: Vector2<f64>, dt: f64) -> Isometry2<f64> {
-    let turn = velocity.y * dt;
-    let length = velocity.x * dt;
+fn advance(pose: &Isometry2<f64>, motion: Motion, dt: f64) -> Isometry2<f64> {
+    let turn = motion.angular * dt;
+    let way = Vector2::new(motion.linear, motion.lateral) * dt;
     // Chord of the arc: its direction is half the turn, its length shrinks by sinc.
     let half = turn / 2.0;
     let chord = if half.abs() < 1e-9 {
-        length
+        way
     } else {
-        length * half.sin() / half
+        way * (half.sin() / half)
     };
-    let step = Isometry2::new(Vector2::new(half.cos(), half.sin()) * chord, turn);
+    let step = Isometry2::new(Rotation2::new(half) * chord, turn);
     pose * step
 }
 
@@ -210,12 +223,14 @@ fn deeper(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scenario::Base as Kind;
     use proptest::prelude::*;
 
     fn command(linear: f64, angular: f64) -> VelocityCommand {
         VelocityCommand {
             time: Time::default(),
             linear,
+            lateral: 0.0,
             angular,
         }
     }
@@ -266,13 +281,38 @@ mod tests {
 
     #[test]
     fn a_turn_while_driving_is_an_arc() {
-        let quarter = advance(
-            &Isometry2::identity(),
-            Vector2::new(std::f64::consts::PI / 2.0, std::f64::consts::PI / 2.0),
-            1.0,
-        );
+        let speed = std::f64::consts::PI / 2.0;
+        let quarter = advance(&Isometry2::identity(), Motion::new(speed, speed), 1.0);
         assert!((quarter.translation.vector - Vector2::new(1.0, 1.0)).norm() < 1e-12);
         assert!((quarter.rotation.angle() - std::f64::consts::PI / 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn only_an_omnidirectional_base_goes_sideways() {
+        let free = Obstacles {
+            walls: Vec::new(),
+            objects: Vec::new(),
+        };
+        for (base, sideways) in [(Kind::Differential, 0.0), (Kind::Omnidirectional, 0.6)] {
+            let robot = Robot {
+                base,
+                ..Robot::default()
+            };
+            let mut body = Base::new(&robot);
+            let mut now = Time::default();
+            for _ in 0..40 {
+                let aside = VelocityCommand {
+                    lateral: 0.6,
+                    ..command(0.0, 0.0)
+                };
+                body.take(now, aside);
+                now = now + 0.05;
+                body.drive(&robot, now, 0.05, &free, &[]);
+            }
+            assert!((body.lateral - sideways).abs() < 1e-9, "{base:?}");
+            assert!((body.position().y - 2.0 * sideways).abs() < 0.5 * sideways + 1e-9);
+            assert!(body.position().x.abs() < 1e-9);
+        }
     }
 
     #[test]

@@ -69,6 +69,7 @@ fn run(world: &mut World, seconds: f64, command: Option<(f64, f64)>) -> Vec<Outp
             let velocity = command.map(|(linear, angular)| VelocityCommand {
                 time,
                 linear,
+                lateral: 0.0,
                 angular,
             });
             world.step(

@@ -1,9 +1,11 @@
 //! Anticipation: whom the robot waits for and whom it goes round.
 
 use super::*;
+use crate::navigation::control::Base;
 use nalgebra::Isometry2;
 
 const LIMITS: Limits = Limits {
+    base: Base::Differential,
     radius: 0.25,
     max_speed: 0.6,
     max_turn: 1.0,

@@ -110,18 +110,9 @@ fn what_is_too_close_stops_the_way_toward_it_and_no_other() {
     let (forwards, backwards) = guard.allowed(&scan(&robot, &ahead), &limits());
     assert_eq!(forwards.to_bits(), 0.0f64.to_bits());
     assert!(backwards.is_infinite());
-    let wanted = Motion {
-        linear: 0.5,
-        angular: 0.7,
-    };
+    let wanted = Motion::new(0.5, 0.7);
     let slowed = guard.slowed(wanted, &scan(&robot, &ahead), &limits());
-    assert_eq!(
-        slowed,
-        Motion {
-            linear: 0.0,
-            angular: 0.7
-        }
-    );
+    assert_eq!(slowed, Motion::new(0.0, 0.7));
     let behind = [(Point2::new(-0.5, 0.0), 0.2)];
     let (forwards, backwards) = guard.allowed(&scan(&robot, &behind), &limits());
     assert!(forwards.is_infinite() && backwards <= 0.0);
@@ -131,6 +122,69 @@ fn what_is_too_close_stops_the_way_toward_it_and_no_other() {
         .collect();
     let (forwards, _) = guard.allowed(&scan(&robot, &beside), &limits());
     assert!((0.05..0.5).contains(&forwards), "{forwards}");
+}
+
+fn omnidirectional() -> Limits {
+    Limits {
+        base: Base::Omnidirectional,
+        ..limits()
+    }
+}
+
+#[test]
+fn an_omnidirectional_base_goes_sideways_at_once_and_turns_meanwhile() {
+    let line = [Point2::new(0.0, 3.0)];
+    let limits = omnidirectional();
+    let wanted = follow(&at(0.0, 0.0, 0.0), &line, 0.8, &limits, false);
+    assert!(wanted.linear.abs() < 1e-9 && (wanted.lateral - 0.8).abs() < 1e-9);
+    assert!(wanted.angular > 0.5);
+    let backwards = follow(&at(0.0, 0.0, 0.0), &line, 0.8, &limits, true);
+    assert!((backwards.lateral - 0.8).abs() < 1e-9 && backwards.angular.abs() < 1e-12);
+    let mut robot = at(0.0, 0.0, 0.0);
+    for _ in 0..120 {
+        let wanted = follow(&robot, &line, 0.8, &limits, false);
+        let motion = limits.reachable(robot.motion, wanted, 0.05);
+        let change = Vector2::new(
+            motion.linear - robot.motion.linear,
+            motion.lateral - robot.motion.lateral,
+        );
+        assert!(motion.speed() <= 0.8 + 1e-12 && change.norm() <= 0.8 * 0.05 + 1e-12);
+        robot = robot.advanced(motion, 0.05);
+        assert!(robot.position.x.abs() < 0.15, "no arc: {}", robot.position);
+    }
+    assert!(
+        distance(&robot.position, &line[0]) < 0.1,
+        "{}",
+        robot.position
+    );
+    assert!((robot.heading - PI / 2.0).abs() < 0.1, "{}", robot.heading);
+}
+
+#[test]
+fn a_differential_base_is_never_told_to_go_sideways() {
+    let wanted = Motion {
+        lateral: 0.5,
+        ..Motion::new(0.5, 0.1)
+    };
+    let reached = limits().reachable(Motion::default(), wanted, 0.1);
+    assert_eq!(reached.lateral.to_bits(), 0.0f64.to_bits());
+}
+
+#[test]
+fn what_is_beside_stops_the_way_to_that_side_and_no_other() {
+    let (guard, robot) = (Guard::default(), at(0.0, 0.0, 0.3));
+    let left = Rotation2::new(0.3) * Vector2::new(0.0, 0.5);
+    let scan = scan(&robot, &[(left.into(), 0.2)]);
+    let toward = |lateral| Motion {
+        lateral,
+        ..Motion::new(0.0, 0.2)
+    };
+    let slowed = guard.slowed(toward(0.6), &scan, &omnidirectional());
+    assert!(slowed.speed() < 1e-9 && (slowed.angular - 0.2).abs() < 1e-12);
+    assert_eq!(
+        guard.slowed(toward(-0.6), &scan, &omnidirectional()),
+        toward(-0.6)
+    );
 }
 
 #[test]
@@ -146,6 +200,32 @@ fn angles_wrap_to_the_smaller_turn() {
 }
 
 proptest! {
+    /// The same whichever way an omnidirectional base goes.
+    #[test]
+    fn the_guard_stops_an_omnidirectional_robot_too(
+        discs in proptest::collection::vec(((-3.0..3.0, -3.0..3.0), 0.05..0.5), 1..8),
+        heading in -PI..PI,
+        velocity in (-0.6..0.6, -0.6..0.6),
+        angular in -0.3..0.3,
+    ) {
+        let discs: Vec<_> = discs.into_iter()
+            .map(|((x, y), radius)| (Point2::new(x, y), radius))
+            .filter(|(centre, radius)| centre.coords.norm() > radius + 0.25)
+            .collect();
+        let (limits, guard) = (omnidirectional(), Guard::default());
+        let mut robot = at(0.0, 0.0, heading);
+        let wanted = Motion { linear: velocity.0, lateral: velocity.1, angular };
+        for _ in 0..120 {
+            let reached = limits.reachable(robot.motion, wanted, 0.05);
+            let motion = guard.slowed(reached, &scan(&robot, &discs), &limits);
+            robot = robot.advanced(motion, 0.05);
+            for (centre, radius) in &discs {
+                let gap = distance(centre, &robot.position) - radius - limits.radius;
+                prop_assert!(gap > -0.01, "{gap}");
+            }
+        }
+    }
+
     /// Whatever speed is asked for, a robot that obeys the guard never touches what it can see.
     #[test]
     fn the_guard_stops_the_robot_before_every_obstacle(
@@ -161,7 +241,7 @@ proptest! {
         let (limits, guard) = (limits(), Guard::default());
         let mut robot = at(0.0, 0.0, heading);
         for _ in 0..120 {
-            let wanted = limits.reachable(robot.motion, Motion { linear, angular }, 0.05);
+            let wanted = limits.reachable(robot.motion, Motion::new(linear, angular), 0.05);
             let motion = guard.slowed(wanted, &scan(&robot, &discs), &limits);
             robot = robot.advanced(motion, 0.05);
             for (centre, radius) in &discs {

@@ -2,7 +2,7 @@
 //! shall carry out. This file owns the names of the nodes and attributes that it goes by.
 
 use crate::grid::shared::SOCIAL_GRID_TIME;
-use crate::navigation::control::Limits;
+use crate::navigation::control::{Base, Limits};
 use crate::navigation::map_age::{MapPatience, MapState};
 use crate::navigation::obstacles::Wall;
 use crate::navigation::people::Person;
@@ -19,6 +19,8 @@ pub const MAP_STATE: &str = "map_state";
 /// The robot's attributes that say from which age of the grid on it drives slower, and stands, seconds. They may be set
 /// while running; where they are absent, [`MapPatience`] has the usual figures.
 pub const MAP_SLOW_AFTER: &str = "map_slow_after";
+/// The robot's attribute that says which ways its base goes: the name of a [`Base`].
+pub const BASE: &str = "base";
 /// See [`MAP_SLOW_AFTER`].
 pub const MAP_HOLD_AFTER: &str = "map_hold_after";
 /// How far from a person the robot stops to talk, metres: outside personal space, which ends 1.18 m
@@ -49,7 +51,8 @@ pub(super) struct World {
 pub(super) struct Robot {
     pub(super) id: NodeId,
     pub(super) limits: Limits,
-    pub(super) velocity: Option<Vector2<f64>>,
+    /// What `velocity` says now.
+    pub(super) velocity: Vec<f64>,
     /// What `path` says now.
     pub(super) path: Vec<f64>,
     pub(super) room: Option<NodeId>,
@@ -214,12 +217,15 @@ fn robot(snapshot: &Snapshot, node: &Node) -> Result<Robot, ReadError> {
     Ok(Robot {
         id: node.id(),
         limits: Limits {
+            base: text(node, BASE)?
+                .and_then(|name| Base::find(&name))
+                .unwrap_or_default(),
             radius: positive(number(node, "radius")?, usual.radius),
             max_speed: positive(number(node, "max_speed")?, usual.max_speed),
             max_turn: positive(number(node, "max_turn")?, usual.max_turn),
             ..usual
         },
-        velocity: vector(node, "velocity")?,
+        velocity: numbers(node, "velocity")?,
         path: numbers(node, "path")?,
         room,
         map_state: text(node, MAP_STATE)?,

@@ -203,6 +203,7 @@ impl Home {
         self.speeches.extend(effects.speech.clone());
         let motion = Motion {
             linear: effects.command.linear,
+            lateral: effects.command.lateral,
             angular: effects.command.angular,
         };
         self.robot = self.robot.advanced(motion, TICK);

@@ -171,6 +171,7 @@ fn cross(seed: u64, noise: f64, social: bool) -> Tally {
         }
         let command = Motion {
             linear: output.command.linear,
+            lateral: output.command.lateral,
             angular: output.command.angular,
         };
         robot = robot.advanced(command, STEP);

@@ -84,7 +84,7 @@ impl Navigator {
             addressee,
         };
         let choice = self.anticipation.choose(&view.robot, &scene);
-        let stands = choice.motion.linear.abs() < 0.02
+        let stands = choice.motion.speed() < 0.02
             && !matches!(choice.manoeuvre, Manoeuvre::Along(share) if share > 0.0);
         let status = if stands {
             Status::Waiting(Cause::People)
@@ -119,7 +119,7 @@ impl Navigator {
     /// long as the companion makes it, and says nothing.
     fn count_standing(&self, course: &mut Course, view: &View) -> f64 {
         course.left = self.band.length();
-        if view.robot.motion.linear.abs() > 0.05 || course.left < 1.0 {
+        if view.robot.motion.speed() > 0.05 || course.left < 1.0 {
             course.headway = view.now;
             course.recoveries = 0;
         }
@@ -130,15 +130,9 @@ impl Navigator {
     pub(super) fn back_off(&self, view: &View) -> Motion {
         let (_, behind) = self.config.guard.allowed(view.scan, &view.inputs.limits);
         if behind > 0.05 {
-            Motion {
-                linear: -0.15,
-                angular: 0.0,
-            }
+            Motion::new(-0.15, 0.0)
         } else {
-            Motion {
-                linear: 0.0,
-                angular: 0.5,
-            }
+            Motion::new(0.0, 0.5)
         }
     }
 }
@@ -167,8 +161,5 @@ pub(super) fn calmed(wanted: Motion, view: &View) -> Motion {
         return wanted;
     }
     let most = speed_near(nearest, limits.max_speed);
-    Motion {
-        linear: wanted.linear.clamp(-most, most),
-        ..wanted
-    }
+    wanted.capped(most)
 }

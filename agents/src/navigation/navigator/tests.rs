@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::grid::BLOCKED;
+use crate::navigation::control::Base;
 use crate::navigation::people::{INTIMATE, PERSONAL};
 use crate::navigation::testing::{odometry, scan};
 use nalgebra::{Isometry2, Vector2};
@@ -18,6 +19,7 @@ struct Hall {
     unknown: Vec<Wall>,
     grid: CostGrid,
     people: Vec<Person>,
+    base: Base,
     social: bool,
     map: MapState,
     navigator: Navigator,
@@ -63,6 +65,7 @@ impl Hall {
             unknown: Vec::new(),
             grid: CostGrid::covering([0.0, 0.0, 8.0, 6.0], 0.1),
             people: Vec::new(),
+            base: Base::default(),
             social: false,
             map: MapState::Current,
             navigator: Navigator::default(),
@@ -99,6 +102,7 @@ impl Hall {
             people: &self.people,
             task,
             limits: Limits {
+                base: self.base,
                 max_speed: 0.6,
                 max_turn: 1.0,
                 ..Limits::default()
@@ -108,6 +112,7 @@ impl Hall {
         let output = self.navigator.step(self.now, &inputs);
         let motion = Motion {
             linear: output.command.linear,
+            lateral: output.command.lateral,
             angular: output.command.angular,
         };
         self.robot = self.robot.advanced(motion, STEP);
@@ -219,6 +224,20 @@ fn by_a_lost_map_the_robot_stands_until_there_is_one_again() {
 }
 
 #[test]
+fn an_omnidirectional_robot_arrives_without_turning_in_place_first() {
+    let took = |base| {
+        let mut hall = Hall::new();
+        hall.robot.heading = FRAC_PI_2;
+        hall.base = base;
+        let (status, took) = hall.run(&point(6.5, 3.0), 40.0);
+        assert_eq!(status, Status::Arrived, "{base:?}");
+        took
+    };
+    let (plain, omni) = (took(Base::Differential), took(Base::Omnidirectional));
+    assert!(omni < plain - 0.8, "{omni} {plain}");
+}
+
+#[test]
 fn a_path_that_the_grid_closes_is_planned_anew() {
     let mut hall = Hall::new();
     let task = point(6.5, 3.0);
@@ -315,10 +334,21 @@ fn where_start_or_goal_are_blocked_the_nearest_places_that_can_be_reached_serve(
 
 #[test]
 fn what_only_the_laser_sees_is_driven_round() {
-    let mut hall = Hall::new();
-    hall.unknown.push(wall(4.0, 0.0, 4.0, 4.2));
-    assert_eq!(hall.run(&point(6.5, 3.0), 60.0).0, Status::Arrived);
-    assert!(hall.least_clearance > 0.25, "{}", hall.least_clearance);
+    for base in Base::ALL {
+        let mut hall = Hall::new();
+        hall.base = base;
+        hall.unknown.push(wall(4.0, 0.0, 4.0, 4.2));
+        assert_eq!(
+            hall.run(&point(6.5, 3.0), 60.0).0,
+            Status::Arrived,
+            "{base:?}"
+        );
+        assert!(
+            hall.least_clearance > 0.25,
+            "{base:?} {}",
+            hall.least_clearance
+        );
+    }
 }
 
 #[test]
