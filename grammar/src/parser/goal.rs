@@ -42,14 +42,17 @@ impl Parser<'_> {
             pattern,
             ..Goal::default()
         };
-        if self.is_word("precondition") {
+        let expected = "`precondition` or the end of the goal";
+        if self.is_word_at(self.at) && self.keyword_among(&["precondition"], expected).is_some() {
             self.bump();
             if let Some(opening) = self.expect("{", "`{`") {
                 goal.precondition = self.condition_block(opening);
             }
-        }
-        if self.peek().is_some() {
-            self.expected("`precondition` or the end of the goal", &["precondition"]);
+            if self.peek().is_some() {
+                self.expected("the end of the goal", &[]);
+            }
+        } else if self.peek().is_some() && !self.is_word_at(self.at) {
+            self.expected(expected, &[]);
         }
         for node in &goal.pattern.nodes {
             let variable = &node.variable;

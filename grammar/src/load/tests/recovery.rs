@@ -147,3 +147,18 @@ fn names_that_a_missing_file_may_declare_are_told_once() {
             f.aggl:7:46: error: no variable `b` in the rule of this step (did you mean `a`?)"#]],
     );
 }
+
+#[test]
+fn a_misspelt_block_of_a_goal_is_checked() {
+    let told =
+        |text: &str| crate::parse_goal(text, "g.aggt", &crate::Types::default()).unwrap_err();
+    let text = "{\n\tr:robot\n}\nprecondtion\n{\n\t(nto (in r q))\n\t(> q.area 1)\n}\nmore";
+    expect![[r#"
+        g.aggt:4:1: error: expected `precondition` or the end of the goal, found `precondtion` (did you mean `precondition`?)
+        g.aggt:6:3: error: expected a link `(label a b)` or an operator, found `nto` (did you mean `not`?)
+        g.aggt:9:1: error: expected the end of the goal, found `more`"#]].assert_eq(&told(text).to_string());
+    expect!["g.aggt:1:13: error: expected `precondition` or the end of the goal, found `more`"]
+        .assert_eq(&told("{ r:robot } more").to_string());
+    expect!["g.aggt:1:13: error: expected `precondition` or the end of the goal, found `}`"]
+        .assert_eq(&told("{ r:robot } }").to_string());
+}
