@@ -55,7 +55,7 @@ impl Watch {
     fn add(&mut self, pattern: usize, row: Row, rows: &mut Rows) {
         if self.patterns[pattern].set.insert(&row) {
             let [added, _] = rows.entry(pattern).or_default();
-            added.insert(row);
+            added.push(row);
         }
     }
 

@@ -100,7 +100,7 @@ type Touched = BTreeMap<(usize, Seed), Can>;
 type Makes = BTreeMap<Vec<NodeId>, Vec<(usize, Vec<usize>)>>;
 
 /// By pattern, new and gone matches.
-type Rows = BTreeMap<usize, [BTreeSet<Row>; 2]>;
+type Rows = BTreeMap<usize, [Vec<Row>; 2]>;
 
 impl Watch {
     /// Finds all matches of the rules in a snapshot.
@@ -173,15 +173,16 @@ impl Watch {
 
     /// How many matches a rule has; none if it is not watched.
     pub fn count(&self, rule: &str) -> usize {
-        self.set_of(rule).map_or(0, |(_, set)| set.rows().len())
+        self.set_of(rule).map_or(0, |(_, set)| set.len())
     }
 
     /// The matches of a rule, by ascending nodes; none if it is not watched.
     pub fn matches(&self, rule: &str) -> impl Iterator<Item = Binding> {
         let found = self.set_of(rule);
         found.into_iter().flat_map(|(index, set)| {
-            let name = &self.rules[index].0;
-            set.rows().map(|row| self.binding(name, row))
+            let variables = self.variables(&self.rules[index].0);
+            let rows = set.rows().into_iter();
+            rows.map(move |row| binding(&variables, row))
         })
     }
 
@@ -190,17 +191,11 @@ impl Watch {
         Some((index, &self.patterns[self.rules[index].1].set))
     }
 
-    fn binding(&self, rule: &Name, row: &Row) -> Binding {
-        let nodes = self
-            .grammar
-            .rule(rule)
-            .into_iter()
-            .flat_map(Rule::bound_nodes);
-        Binding::of_distinct(
-            nodes
-                .map(|node| node.variable.clone())
-                .zip(row.iter().copied()),
-        )
+    /// What a rule binds, by slot.
+    fn variables(&self, rule: &Name) -> Vec<Name> {
+        let nodes = self.grammar.rule(rule).into_iter();
+        let nodes = nodes.flat_map(Rule::bound_nodes);
+        nodes.map(|node| node.variable.clone()).collect()
     }
 
     /// Takes in a change. `snapshot` is of the change's version or a later one; an earlier one
@@ -228,7 +223,10 @@ impl Watch {
             return self.refresh(snapshot);
         }
         self.torn = true;
-        let rows = self.take_in(change, snapshot)?;
+        let mut rows = self.take_in(change, snapshot)?;
+        rows.values_mut()
+            .flatten()
+            .for_each(|rows| rows.sort_unstable());
         self.torn = false;
         self.version = change.version;
         Ok(self.delta(&rows))
@@ -245,7 +243,7 @@ impl Watch {
             .iter()
             .map(|name| {
                 self.set_of(name)
-                    .map(|(_, set)| set.rows().cloned().collect())
+                    .map(|(_, set)| set.rows().into_iter().cloned().collect())
             })
             .map(Option::unwrap_or_default)
             .collect();
@@ -260,7 +258,7 @@ impl Watch {
             let Some((index, set)) = self.set_of(name) else {
                 continue;
             };
-            let now: BTreeSet<Row> = set.rows().cloned().collect();
+            let now: BTreeSet<Row> = set.rows().into_iter().cloned().collect();
             let name = &self.rules[index].0;
             delta.added.extend(self.told(name, now.difference(&before)));
             delta
@@ -270,15 +268,17 @@ impl Watch {
         Ok(delta)
     }
 
-    fn told<'a>(
-        &'a self,
-        rule: &'a Name,
-        rows: impl Iterator<Item = &'a Row> + 'a,
-    ) -> impl Iterator<Item = RuleMatch> + 'a {
-        rows.map(|row| RuleMatch {
+    fn told<'a>(&self, rule: &Name, rows: impl Iterator<Item = &'a Row>) -> Vec<RuleMatch> {
+        let mut rows = rows.peekable();
+        if rows.peek().is_none() {
+            return Vec::new();
+        }
+        let variables = self.variables(rule);
+        let told = rows.map(|row| RuleMatch {
             rule: rule.clone(),
-            binding: self.binding(rule, row),
-        })
+            binding: binding(&variables, row),
+        });
+        told.collect()
     }
 
     fn delta(&self, rows: &Rows) -> MatchDelta {
@@ -320,7 +320,7 @@ impl Watch {
                 for row in pattern.set.extending(&seed) {
                     if can.break_all || !pattern.holds(snapshot, &row)? {
                         pattern.set.remove(&row);
-                        removed.insert(row);
+                        removed.push(row);
                     }
                 }
             }
@@ -424,6 +424,10 @@ impl Watch {
         }
         Ok(())
     }
+}
+
+fn binding(variables: &[Name], row: &Row) -> Binding {
+    Binding::of_distinct(variables.iter().cloned().zip(row.iter().copied()))
 }
 
 fn note(index: usize, seeds: Seeds, can: Can, touched: &mut Touched, afresh: &mut BTreeSet<usize>) {
