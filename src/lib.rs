@@ -105,6 +105,20 @@ impl Failure {
         Self::Input(BadInput(message.to_string(), Some(help.into())).into())
     }
 
+    /// The same, with more help; a report with a place of its own stays as it is.
+    fn with_help(self, more: &str) -> Self {
+        let Self::Input(report) = self else {
+            return self;
+        };
+        match report.downcast::<BadInput>() {
+            Ok(BadInput(message, help)) => {
+                let help = help.map_or_else(|| more.to_owned(), |help| format!("{help}; {more}"));
+                Self::Input(BadInput(message, Some(help)).into())
+            }
+            Err(report) => Self::Input(report),
+        }
+    }
+
     fn internal(error: impl std::fmt::Display) -> Self {
         Self::Internal(miette::Report::msg(error.to_string()))
     }

@@ -22,7 +22,7 @@ mod testing;
 
 pub use mission::{
     Cause, Config, Decision, Entry, Executive, Mission, MissionSpec, MissionStatus, MissionStep,
-    Planner, Preemption, Request, RulePlanner, Schedule, StepStatus, learned, missions,
+    Planner, Preemption, Request, RulePlanner, Schedule, StepStatus, experience, missions,
     missions_with_steps, steps,
 };
 pub use plan::{Options, Outcome, Raised, Status, Step, plan};

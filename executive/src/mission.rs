@@ -17,7 +17,7 @@ mod spec;
 mod testing;
 
 pub use decision::{Cause, Decision};
-pub use outcomes::learned;
+pub use outcomes::experience;
 pub use record::{
     Mission, MissionStatus, Preemption, Request, Step as MissionStep, StepStatus, missions,
     missions_with_steps, steps,

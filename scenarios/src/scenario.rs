@@ -20,7 +20,7 @@ mod value;
 pub use diagnostic::{Invalid, LoadError, Problem, ProblemKind};
 pub use file::parse_social;
 pub use load::MAIN_FILE;
-pub use missions::{Earlier, MissionFile};
+pub use missions::{Earlier, MissionFile, Present};
 pub use schedule::parse_schedule;
 #[cfg(test)]
 pub(crate) use space::CLASSES;

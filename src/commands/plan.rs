@@ -6,7 +6,7 @@ use crate::cli::Plan as Arguments;
 use crate::{Answer, Failure};
 use dsr::{Graph, Image, Schema, Snapshot};
 use executive::pddl::{self, WriteError, Written};
-use executive::{Effort, Limits, Milestones, Options, Outcome, Status, plan};
+use executive::{Effort, Limits, Milestones, Options, Outcome, Raised, Status, plan};
 use grammar::live::Published;
 use grammar::{Grammar, SourceFile};
 use serde_json::json;
@@ -72,14 +72,15 @@ fn by_rules(
     effort: Effort,
     limits: &mut Limits<'_>,
 ) -> Result<(Outcome, Option<Written>), Failure> {
-    let (grammar, snapshot, goal) = match (arguments.files.as_slice(), &arguments.instance) {
+    let (grammar, snapshot, goal, raised) = match (arguments.files.as_slice(), &arguments.instance)
+    {
         ([domain, world, goal], None) => {
             let grammar = super::load_grammar(&super::read_text(domain)?, domain)?;
-            (grammar, read_graph(world)?.snapshot(), goal)
+            (grammar, read_graph(world)?.snapshot(), goal, Vec::new())
         }
         ([goal], Some(instance)) => {
-            let (grammar, snapshot) = of_instance(instance)?;
-            (grammar, snapshot, goal)
+            let (grammar, snapshot, raised) = of_instance(instance)?;
+            (grammar, snapshot, goal, raised)
         }
         (_, None) => return Err(Failure::input("a grammar, a world and a goal are needed")),
         (_, Some(_)) => {
@@ -95,6 +96,7 @@ fn by_rules(
     let options = Options {
         effort,
         spares: arguments.spares.into(),
+        raised,
         ..Options::default()
     };
     let mut written = None;
@@ -120,9 +122,9 @@ fn by_rules(
     Ok((outcome, written))
 }
 
-/// The rules and a copy of the graph of a running system: what is planned with may take longer than
+/// The rules and a copy of the graph of a running system, and what its executive found to be dearer: what is planned with may take longer than
 /// the system keeps a version.
-fn of_instance(name: &str) -> Result<(Grammar, Snapshot), Failure> {
+fn of_instance(name: &str) -> Result<(Grammar, Snapshot, Vec<Raised>), Failure> {
     let mut session = attach(name)?;
     let (published, image) = session
         .read(|snapshot| Ok((Published::find(snapshot)?, Image::of(snapshot)?)))
@@ -140,8 +142,9 @@ fn of_instance(name: &str) -> Result<(Grammar, Snapshot), Failure> {
         .read(snapshot.schema())
         .map_err(|defects| Failure::Input(defects.into()))?;
     // As the executive would plan for a new mission.
-    let learned = executive::learned(&grammar, &snapshot).map_err(Failure::internal)?;
-    Ok((learned.into_owned(), snapshot))
+    let (learned, raised) =
+        executive::experience(&grammar, &snapshot).map_err(Failure::internal)?;
+    Ok((learned, snapshot, raised))
 }
 
 fn write_file(path: &Path, text: &str) -> Result<(), Failure> {

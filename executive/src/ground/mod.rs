@@ -28,6 +28,7 @@ pub(crate) use truth::lacking;
 pub(crate) use value::{amount, evaluate};
 
 use crate::search::{Limits, StopReason};
+use crate::task::MOST_COST;
 use dsr::{ReadError, Snapshot};
 use grammar::{Goal, GoalConstants, Grammar};
 use program::Program;
@@ -221,10 +222,11 @@ impl Problem {
         let is = match unpriced.value.as_ref().map(dsr::Value::as_f64) {
             None => "has no value".to_owned(),
             Some(None) => "is no number".to_owned(),
-            Some(Some(amount)) => format!("is {amount}, and costs are 0 or more"),
+            Some(Some(amount)) => format!("is {amount}, and costs are from 0 to {MOST_COST}"),
         };
         let others = match unpriced.times {
             1 => String::new(),
+            2 => " (and at another binding)".to_owned(),
             times => format!(" (and at {} other bindings)", times - 1),
         };
         format!("{rule}({binding}) was left out, since its cost {cost} {is}{others}")

@@ -2,6 +2,7 @@
 //! evaluation, over places that a search may fill with values that the graph does not have yet.
 
 use super::program::{Place, Term};
+use crate::task::MOST_COST;
 use dsr::Value;
 use grammar::{Comparison, Number};
 
@@ -31,8 +32,8 @@ pub(crate) fn compare(operator: Comparison, left: Option<&Value>, right: Option<
     operator.holds(left, right)
 }
 
-/// A cost or duration: a number that is 0 or more.
+/// A cost: a number from 0 to [`MOST_COST`].
 pub(crate) fn amount(value: Option<&Value>) -> Option<f64> {
     let amount = Number::of(value?)?.real();
-    (amount >= 0.0 && amount.is_finite()).then_some(amount)
+    (0.0..=MOST_COST).contains(&amount).then_some(amount)
 }

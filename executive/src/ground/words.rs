@@ -98,7 +98,7 @@ impl Words<'_> {
     /// An expression as AGGL writes it, with names for bound variables.
     pub(crate) fn term(&self, term: &Term, operator: &Operator, environment: &[Object]) -> String {
         match term {
-            Term::Constant(value) => format!("{value:?}"),
+            Term::Constant(value) => dsr::json::value_to_json(value).to_string(),
             Term::Place(Place::Node(slot, attribute)) => {
                 let object = environment.get(*slot as usize).copied();
                 let object = self.object(object.unwrap_or(UNBOUND), operator, *slot as usize);

@@ -3,7 +3,7 @@
 //! too goes on as the same node, and that no two steps of a mission ever have the same name.
 
 use super::decision::Occasion;
-use super::failures::Failures;
+use super::failures::{Failures, Silent};
 use super::outcomes;
 use super::record::{Mission, Step};
 use super::{Executive, MissionStatus, Planner, StepStatus, Turn, drop_open};
@@ -17,6 +17,8 @@ pub(super) enum Sought {
     Plan(Vec<Step>),
     /// There is none, and why.
     Nothing(String),
+    /// There is none, why, and it has been waited for long enough.
+    Never(String),
     /// The last one was sought too short a time ago, or seeking it was interrupted.
     NotNow,
 }
@@ -27,19 +29,27 @@ impl<P: Planner> Executive<P> {
         if self.search.not_before.is_some_and(|time| turn.now < time) {
             return Ok(Sought::NotNow);
         }
-        let failures = Failures::of(&mission.steps, turn.now, &self.config);
-        let mut options = self.config.options.clone();
-        options
-            .raised
-            .extend(failures.raised(&self.grammar, &self.config));
-        let grammar = outcomes::learned(&self.grammar, turn.snapshot)?;
-        let outcome = self.planner.plan(
-            &grammar,
-            turn.snapshot,
-            turn.goal,
-            &options,
-            turn.interrupted,
-        )?;
+        let recent = outcomes::recent(turn.snapshot)?;
+        let others = others(recent.clone(), mission);
+        let failures = Failures::of(&mission.steps, &others, turn.now, &self.config);
+        let grammar = outcomes::learned(&self.grammar, &recent);
+        let plan = |silent: Silent| {
+            let mut options = self.config.options.clone();
+            let raised = failures.raised(&self.grammar, &self.config, silent);
+            options.raised.extend(raised);
+            self.planner.plan(
+                &grammar,
+                turn.snapshot,
+                turn.goal,
+                &options,
+                turn.interrupted,
+            )
+        };
+        let mut outcome = plan(Silent::LeftOut)?;
+        let asks_again = failures.may_ask_again(turn.now, &self.config);
+        if outcome.status != Status::Solved && asks_again && !(turn.interrupted)() {
+            outcome = plan(Silent::Asked)?;
+        }
         if outcome.status == Status::Limit && (turn.interrupted)() {
             return Ok(Sought::NotNow);
         }
@@ -49,7 +59,12 @@ impl<P: Planner> Executive<P> {
                 let reason = outcome.reason.unwrap_or_default();
                 let mut words = vec![format!("no plan: {reason}")];
                 words.extend(failures.left_out(&self.config));
-                Sought::Nothing(words.join("; "))
+                let words = words.join("; ");
+                if failures.leaves_out_agents(&self.config) {
+                    Sought::Never(words)
+                } else {
+                    Sought::Nothing(words)
+                }
             }
         };
         let found = matches!(sought, Sought::Plan(_));
@@ -134,6 +149,12 @@ impl<P: Planner> Executive<P> {
         self.search.sound = None;
         self.search.traced = None;
     }
+}
+
+/// Those steps that are of other missions.
+fn others(mut recent: Vec<Step>, mission: &Mission) -> Vec<Step> {
+    recent.retain(|step| !mission.steps.iter().any(|own| own.name == step.name));
+    recent
 }
 
 /// The steps of a plan, for the graph.

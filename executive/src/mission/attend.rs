@@ -33,8 +33,9 @@ impl<P: Planner> Executive<P> {
             self.answer(now, mission);
             if again && mission.is_due_again(now) {
                 mission.begin_again(now);
-                let what = format!("mission `{}` is queued", mission.name);
-                self.log(now, what, mission.reason.clone());
+                let why = mission.reason.clone();
+                mission.note(now, mission.status.name(), &Occasion::new(&why));
+                self.log(now, format!("mission `{}` is queued", mission.name), why);
             }
             if late && !mission.status.is_over() {
                 let open = mission.steps.iter().find(|step| step.status.is_open());

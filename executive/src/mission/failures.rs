@@ -14,57 +14,73 @@ use std::collections::{BTreeMap, BTreeSet};
 pub(super) struct Failures<'a> {
     /// Rules at bindings that failed.
     steps: Vec<(&'a Step, usize)>,
-    /// Steps that their agents did not take, one for each agent that has taken none since.
+    /// Steps that their agents did not take, one for each agent that has taken none since, and how many there
+    /// were of this mission: none where other missions tell of the agent.
     unanswered: Vec<(&'a Step, usize)>,
+    /// When the first of those of this mission was given up.
+    silent_since: Option<Time>,
+}
+
+/// What becomes of an agent that left as many steps unanswered as a step is tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Silent {
+    /// Plans do without it.
+    LeftOut,
+    /// It is asked where there is no other way.
+    Asked,
 }
 
 impl<'a> Failures<'a> {
-    /// What went wrong with `steps`, oldest first, within the executive's memory.
-    pub(super) fn of(steps: &'a [Step], now: Time, config: &Config) -> Self {
+    /// What went wrong with the steps of a mission, oldest first, and what those of `others` tell of agents,
+    /// within the executive's memory.
+    pub(super) fn of(own: &'a [Step], others: &'a [Step], now: Time, config: &Config) -> Self {
         let mut failures = Self {
             steps: Vec::new(),
             unanswered: Vec::new(),
+            silent_since: None,
         };
+        let others = others.iter().map(|step| (step, 0));
+        let mut all: Vec<(&Step, usize)> = others.chain(own.iter().map(|step| (step, 1))).collect();
+        all.retain(|(step, _)| now.since(step.since) <= config.memory);
+        all.sort_by_key(|(step, _)| step.since);
         let mut answering = BTreeSet::new();
-        for step in steps.iter().rev() {
-            if now.since(step.since) > config.memory {
-                continue;
-            }
-            let (known, same): (_, fn(&Step, &Step) -> bool) = match step.status {
-                StepStatus::Failed => (&mut failures.steps, Step::is_alike),
-                StepStatus::Unanswered if !answering.contains(&step.agent) => {
-                    (&mut failures.unanswered, |a, b| a.agent == b.agent)
+        for (step, counts) in all.into_iter().rev() {
+            match step.status {
+                StepStatus::Failed => {
+                    answering.insert(&step.agent);
+                    if counts > 0 {
+                        count(&mut failures.steps, step, 1, Step::is_alike);
+                    }
                 }
                 StepStatus::Done | StepStatus::Running => {
                     answering.insert(&step.agent);
-                    continue;
                 }
-                _ => continue,
-            };
-            if step.status == StepStatus::Failed {
-                answering.insert(&step.agent);
-            }
-            match known.iter_mut().find(|(known, _)| same(known, step)) {
-                Some((_, times)) => *times += 1,
-                None => known.push((step, 1)),
+                StepStatus::Unanswered if !answering.contains(&step.agent) => {
+                    count(&mut failures.unanswered, step, counts, |a, b| {
+                        a.agent == b.agent
+                    });
+                    if counts > 0 {
+                        failures.silent_since = Some(step.since);
+                    }
+                }
+                _ => {}
             }
         }
         failures
     }
 
     /// What shall cost more in the next plan, or be left out.
-    pub(super) fn raised(&self, grammar: &Grammar, config: &Config) -> Vec<Raised> {
-        let by = |times: usize| {
-            if times >= config.tries {
-                f64::INFINITY
-            } else {
-                config.penalty * times as f64
-            }
-        };
+    pub(super) fn raised(&self, grammar: &Grammar, config: &Config, silent: Silent) -> Vec<Raised> {
+        let dearer = |times: usize| config.penalty * times.max(1) as f64;
+        let often = |times: usize| times >= config.tries;
         let steps = self.steps.iter().map(|&(step, times)| Raised {
             rule: step.rule.clone(),
             binding: step.binding.clone(),
-            by: by(times),
+            by: if often(times) {
+                f64::INFINITY
+            } else {
+                dearer(times)
+            },
         });
         let agents = self.unanswered.iter().flat_map(|&(step, times)| {
             let rules = grammar.rules.iter();
@@ -72,10 +88,27 @@ impl<'a> Failures<'a> {
             rules.map(move |rule| Raised {
                 rule: rule.name.to_string(),
                 binding: BTreeMap::new(),
-                by: by(times),
+                by: if often(times) && silent == Silent::LeftOut {
+                    f64::INFINITY
+                } else {
+                    dearer(times)
+                },
             })
         });
         steps.chain(agents).collect()
+    }
+
+    /// Whether agents are left out that may be asked again, where there is no other way.
+    pub(super) fn may_ask_again(&self, now: Time, config: &Config) -> bool {
+        let recent = |since: Time| now.since(since) < config.silence;
+        self.leaves_out_agents(config) && self.silent_since.is_some_and(recent)
+    }
+
+    /// Whether agents are left out.
+    pub(super) fn leaves_out_agents(&self, config: &Config) -> bool {
+        self.unanswered
+            .iter()
+            .any(|(_, times)| *times >= config.tries)
     }
 
     /// What is left out of the next plan, in words.
@@ -93,6 +126,19 @@ impl<'a> Failures<'a> {
             let agent = &step.agent;
             format!("agent {agent} did not take {times} steps, the last of them {step}")
         }))
+    }
+}
+
+/// Counts a step with the one of its kind.
+fn count<'a>(
+    known: &mut Vec<(&'a Step, usize)>,
+    step: &'a Step,
+    by: usize,
+    same: fn(&Step, &Step) -> bool,
+) {
+    match known.iter_mut().find(|(known, _)| same(known, step)) {
+        Some((_, times)) => *times += by,
+        None => known.push((step, by)),
     }
 }
 
@@ -121,8 +167,11 @@ mod tests {
             moves : active(1) agent(drive) { { room:room } => { room:room } }\n";
         let rules = crate::testing::read(rules);
         let config = Config::default();
-        let failures = Failures::of(&steps, Time::from_seconds(1100.0), &config);
-        let raised = failures.raised(&rules, &config).into_iter();
+        let now = Time::from_seconds(1100.0);
+        let failures = Failures::of(&steps, &[], now, &config);
+        let raised = failures
+            .raised(&rules, &config, Silent::LeftOut)
+            .into_iter();
         let raised = raised.map(|one| format!("{} {:?} by {}", one.rule, one.binding, one.by));
         let lines: Vec<String> = raised.chain(failures.left_out(&config)).collect();
         lines.join("\n")

@@ -1,7 +1,10 @@
 //! What outcomes teach: a rule whose steps fail costs more than it says. This file guarantees that a
 //! rule of which no step failed is planned with as it stands in the grammar.
 
-use super::record::{self, StepStatus};
+use super::Config;
+use super::failures::{Failures, Silent};
+use super::record::{self, Step, StepStatus};
+use crate::Raised;
 use dsr::{ReadError, Snapshot};
 use grammar::{Arithmetic, Expression, Grammar, Literal};
 use std::borrow::Cow;
@@ -12,31 +15,48 @@ const WEIGHT: f64 = 10.0;
 /// The outcomes of so many missions are read, the newest.
 const MISSIONS: usize = 20;
 
-/// The grammar with the success of each rule as the steps in the graph bear it out, and with costs
-/// by which a rule that fails more often than it says has to be tried more often.
+/// The steps of the newest missions.
+pub(super) fn recent(snapshot: &Snapshot) -> Result<Vec<Step>, ReadError> {
+    let mut steps = Vec::new();
+    for mission in record::missions(snapshot)?.iter().rev().take(MISSIONS) {
+        steps.extend(record::steps(snapshot, mission.id)?);
+    }
+    Ok(steps)
+}
+
+/// What the executive would plan a new mission with: the grammar as outcomes bear it out, and what costs more
+/// since its agent did not take steps lately.
 ///
 /// # Errors
 /// [`ReadError`].
-pub fn learned<'a>(
-    grammar: &'a Grammar,
+pub fn experience(
+    grammar: &Grammar,
     snapshot: &Snapshot,
-) -> Result<Cow<'a, Grammar>, ReadError> {
-    let mut outcomes: BTreeMap<String, (f64, f64)> = BTreeMap::new();
-    for mission in record::missions(snapshot)?.iter().rev().take(MISSIONS) {
-        for step in record::steps(snapshot, mission.id)? {
-            let (done, failed) = match step.status {
-                StepStatus::Done => (1.0, 0.0),
-                StepStatus::Failed => (0.0, 1.0),
-                _ => continue,
-            };
-            let known = outcomes.entry(step.rule).or_default();
-            known.0 += done;
-            known.1 += failed;
-        }
+) -> Result<(Grammar, Vec<Raised>), ReadError> {
+    let config = Config::default();
+    let steps = recent(snapshot)?;
+    let failures = Failures::of(&[], &steps, snapshot.time(), &config);
+    let raised = failures.raised(grammar, &config, Silent::Asked);
+    Ok((learned(grammar, &steps).into_owned(), raised))
+}
+
+/// The grammar with the success of each rule as `steps` bear it out, and with costs by which a rule that fails
+/// more often than it says has to be tried more often.
+pub(super) fn learned<'a>(grammar: &'a Grammar, steps: &[Step]) -> Cow<'a, Grammar> {
+    let mut outcomes: BTreeMap<&str, (f64, f64)> = BTreeMap::new();
+    for step in steps {
+        let (done, failed) = match step.status {
+            StepStatus::Done => (1.0, 0.0),
+            StepStatus::Failed => (0.0, 1.0),
+            _ => continue,
+        };
+        let known = outcomes.entry(&step.rule).or_default();
+        known.0 += done;
+        known.1 += failed;
     }
     outcomes.retain(|_, (_, failed)| *failed > 0.0);
     if outcomes.is_empty() {
-        return Ok(Cow::Borrowed(grammar));
+        return Cow::Borrowed(grammar);
     }
     let mut grammar = grammar.clone();
     for rule in &mut grammar.rules {
@@ -52,7 +72,7 @@ pub fn learned<'a>(
         };
         rule.success = success;
     }
-    Ok(Cow::Owned(grammar))
+    Cow::Owned(grammar)
 }
 
 #[cfg(test)]
@@ -65,11 +85,11 @@ mod tests {
         let mut house = House::new(&[("greet", GREET_ANA, 0)]);
         house.run(3);
         let rules = crate::testing::read(crate::mission::testing::RULES);
-        let before = learned(&rules, &house.graph.snapshot()).unwrap();
+        let before = learned(&rules, &recent(&house.graph.snapshot()).unwrap());
         assert!(matches!(before, Cow::Borrowed(_)));
         house.agent = Agent::FailsAt("approach");
         house.run(8);
-        let after = learned(&rules, &house.graph.snapshot()).unwrap();
+        let after = learned(&rules, &recent(&house.graph.snapshot()).unwrap());
         let steps = house.steps();
         let failed = |line: &&str| line.contains(") failed: ") && !line.contains(") dropped: ");
         let failed = steps.lines().filter(failed).count() as f64;

@@ -187,6 +187,9 @@ impl<P: Planner> Executive<P> {
         self.search.why.clone_from(occasion);
         match self.seek(turn, mission)? {
             Sought::Plan(steps) => self.adopt(turn.now, mission, steps, occasion),
+            Sought::Never(reason) => {
+                self.finish(turn.now, mission, MissionStatus::Failed, &reason);
+            }
             Sought::Nothing(reason) => {
                 drop_open(turn.now, mission, why, None);
                 let since = *self.search.fruitless.get_or_insert(turn.now);
@@ -223,7 +226,7 @@ impl<P: Planner> Executive<P> {
                 self.adopt(turn.now, mission, steps, occasion);
                 Ok(true)
             }
-            Sought::Nothing(reason) => {
+            Sought::Nothing(reason) | Sought::Never(reason) => {
                 let reason = format!("{}; {reason}", occasion.why);
                 self.search.warned = true;
                 if mission.reason != reason {

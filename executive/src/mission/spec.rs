@@ -112,6 +112,9 @@ pub struct Config {
     pub memory: f64,
     /// ... a step that failed so often is left out.
     pub tries: usize,
+    /// An agent without which there is no plan is asked again for so long since it first left a step
+    /// unanswered, seconds.
+    pub silence: f64,
     /// So many steps that are over stay in the graph, per mission.
     pub history: usize,
 }
@@ -130,6 +133,7 @@ impl Default for Config {
             penalty: 100.0,
             memory: 600.0,
             tries: 3,
+            silence: 60.0,
             history: 100,
         }
     }

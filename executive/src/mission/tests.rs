@@ -209,8 +209,26 @@ fn a_silent_agent_is_noticed_by_its_deadline_and_in_the_end_given_up() {
         go/2/2 changeRoom(shelly, hall, kitchen) dispatched
         go/2/3 changeRoom(shelly, kitchen, ward) pending"]].assert_eq(&house.steps());
     house.run(300);
-    expect!["failed, 2: no plan: shelly -in-> ward cannot be reached; steps that failed lately were left out; agent navigation did not take 3 steps, the last of them changeRoom(robot=shelly, room1=hall, room2=kitchen)"].assert_eq(&house.mission("go"));
+    expect!["failed, 3: no plan: shelly -in-> ward cannot be reached; steps that failed lately were left out; agent navigation did not take 4 steps, the last of them changeRoom(robot=shelly, room1=hall, room2=kitchen)"].assert_eq(&house.mission("go"));
     assert_eq!(house.turn(), 0);
+}
+
+#[test]
+fn an_agent_that_answers_after_long_is_at_work_again() {
+    let mut house = House::new(&[("go", GO_TO_WARD, 0)]);
+    house.agent = Agent::Silent;
+    // Three steps of 20 s are over: without another way it is asked a fourth time.
+    house.run(130);
+    assert!(house.mission("go").starts_with("running"));
+    let experience = || {
+        let rules = crate::testing::read(super::testing::RULES);
+        let (_, raised) = crate::experience(&rules, &house.graph.snapshot()).unwrap();
+        raised.len()
+    };
+    assert_eq!(experience(), 3, "another mission knows of all its rules");
+    house.agent = Agent::Works;
+    house.run(10);
+    expect!["succeeded, 3: the goal holds"].assert_eq(&house.mission("go"));
 }
 
 #[test]

@@ -4,7 +4,7 @@
 use super::definition::{Condition, Cost, Definition, Effect, Object};
 use super::facts::AtomId;
 use super::reach::{Reached, each_choice};
-use crate::task::{self, Fact, Formula, Literal, Micro, Task, micro};
+use crate::task::{self, Fact, Formula, Literal, MOST_COST, Micro, Task, micro};
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
 
@@ -59,22 +59,24 @@ pub(super) fn instantiate(definition: &Definition, reached: &Reached) -> Ground 
     for (index, (number, objects)) in reached.instances.iter().enumerate() {
         let action = &definition.actions[*number];
         let mut environment = environment(action.slots, objects);
-        let cost = if definition.metric {
+        let worth = if definition.metric {
             worth(&action.cost, &environment, &values)
         } else {
             Some(1.0)
         };
-        let Some(cost) = cost.filter(|cost| *cost >= 0.0 && cost.is_finite()) else {
+        let Some(cost) = worth.filter(|cost| (0.0..=MOST_COST).contains(cost)) else {
             left_out += 1;
             without_cost.get_or_insert_with(|| {
                 let instance = definition.written(&action.name, objects);
-                let why = match unvalued(&action.cost, &environment, &values) {
-                    Some((function, objects)) => {
-                        let function = definition.functions.name(function);
-                        let place = definition.written(function, &objects);
-                        format!("{place} has no value")
-                    }
-                    None => "its cost is less than 0, or none at all".to_owned(),
+                let place = |(function, objects): (usize, Vec<Object>)| {
+                    definition.written(definition.functions.name(function), &objects)
+                };
+                let why = match (unvalued(&action.cost, &environment, &values), worth) {
+                    (Some(unvalued), _) => format!("{} has no value", place(unvalued)),
+                    (None, worth) => format!(
+                        "its cost is {}, and costs are from 0 to {MOST_COST}",
+                        worth.unwrap_or(f64::NAN)
+                    ),
                 };
                 format!("{instance} was left out, since {why}")
             });

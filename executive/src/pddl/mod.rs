@@ -157,8 +157,10 @@ fn why_unsolvable(
     if let Some(words) = &ground.without_cost {
         reasons.push(words.clone());
     }
-    if ground.left_out > 1 {
-        reasons.push(format!("so were {} other actions", ground.left_out - 1));
+    match ground.left_out {
+        0 | 1 => {}
+        2 => reasons.push("so was another action".to_owned()),
+        more => reasons.push(format!("so were {} other actions", more - 1)),
     }
     reasons.join("; ")
 }

@@ -18,6 +18,9 @@ pub type Fact = u32;
 /// admissible heuristic stays so and equal plans cost the same whatever the order of summation.
 pub type Micro = u64;
 
+/// No action costs more: the costs of ten thousand actions still have a sum.
+pub const MOST_COST: f64 = 1e9;
+
 /// A cost as an integer: rounded to the nearest millionth, not below 0.
 pub fn micro(cost: f64) -> Micro {
     (cost.max(0.0) * 1e6).round() as Micro
@@ -25,7 +28,7 @@ pub fn micro(cost: f64) -> Micro {
 
 /// The other way.
 pub fn from_micro(cost: Micro) -> f64 {
-    cost as f64 * 1e-6
+    cost as f64 / 1e6
 }
 
 /// The facts that hold, one bit each; [`Task::words`] words.

@@ -151,6 +151,12 @@ pub enum ProblemKind {
         /// The line of its first use.
         line: usize,
     },
+    /// A name that a node of the graph has.
+    #[error("there is already a node `{name}`")]
+    TakenName {
+        /// The name.
+        name: String,
+    },
     /// A name that could not be written in a rule or a path.
     #[error("`{name}` is not a name")]
     BadName {

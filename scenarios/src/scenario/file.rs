@@ -103,6 +103,14 @@ impl<'a> Names<'a> {
         Some(value)
     }
 
+    /// All that were taken here, and where.
+    pub(super) fn all(&self) -> impl Iterator<Item = Located<String>> {
+        self.taken.iter().map(|(name, _, span)| Located {
+            value: name.clone(),
+            span: span.clone(),
+        })
+    }
+
     /// The name of the table where it gives one, else `default`; noted as taken.
     pub(super) fn take_or(&mut self, table: &Table<'_>, default: &str) -> String {
         if table.has("name") {

@@ -9,14 +9,37 @@ use super::value::{DAY, Period, Preemption};
 use agents::names::suggest;
 use dsr::Time;
 use jiff::civil::{DateTime, Time as ClockTime};
+use std::collections::BTreeSet;
+use std::fmt;
 
 /// Missions to be submitted together, and the grammar that they go by.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct MissionFile {
     /// The grammar's file, relative to the mission file's folder, and its text.
     pub rules: Option<(String, String)>,
     /// In the order of the file.
     pub missions: Vec<Mission>,
+}
+
+/// What there is already when a mission file is submitted.
+#[derive(Clone, Copy)]
+pub struct Present<'a> {
+    /// The time of the instance.
+    pub now: Time,
+    /// Its missions.
+    pub missions: &'a [Earlier],
+    /// Whether a node has this name.
+    pub has: &'a dyn Fn(&str) -> bool,
+}
+
+impl fmt::Debug for Present<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let missions = self.missions;
+        f.debug_struct("Present")
+            .field("now", &self.now)
+            .field("missions", &missions)
+            .finish_non_exhaustive()
+    }
 }
 
 /// A mission that is there already.
@@ -29,42 +52,48 @@ pub struct Earlier {
 }
 
 impl MissionFile {
-    /// Reads a mission file: `rules` names the grammar to go by; each `[[mission]]` has a `name`, a
+    /// Reads a mission file, as far as it can be read, and tells every problem with it. `rules` names the grammar to go by; each `[[mission]]` has a `name`, a
     /// `goal` (a file) and, where they are wanted, `priority`, `preemption`, `at` (a time of day, the next
-    /// one after `now`; days begin at midnight of the instance's clock), `every` ("hour", "day", "week" or
+    /// one after that of `present`; days begin at midnight of the instance's clock), `every` ("hour", "day", "week" or
     /// seconds), `within` (seconds from its beginning until it fails) and `after` (the name of a mission
-    /// that must have succeeded: of the file, or one of `earlier`). `read` gives the text of the files that it
+    /// that must have succeeded: of the file, or one that is present). `read` gives the text of the files that it
     /// names, `file` is how diagnostics call it.
-    ///
-    /// # Errors
-    /// Every problem found, each with its line and column.
     pub fn parse(
         file: &str,
         text: &str,
-        now: Time,
-        earlier: &[Earlier],
+        present: Present<'_>,
         read: &dyn Fn(&str) -> std::io::Result<String>,
-    ) -> Result<Self, Box<Invalid>> {
+    ) -> (Self, Option<Box<Invalid>>) {
         let invalid = |problems: Vec<Problem>| Box::new(Invalid::new(file, text, problems));
-        let document = document(text).map_err(invalid)?;
+        let document = match document(text) {
+            Ok(document) => document,
+            Err(problems) => return (Self::default(), Some(invalid(problems))),
+        };
         let problems = Problems::default();
         let title = "the mission file".to_owned();
         let table = Table::new(document.get_ref(), 0..0, title, &problems);
         let mut names = Names::new(text);
         let path = table.get::<String>("rules");
         let rules = path.map(|path| (path.value, super::file::file(&table, "rules", "", read)));
-        let missions = missions(&table, &mut names, moment(now), earlier, read);
+        let missions = missions(
+            &table,
+            &mut names,
+            moment(present.now),
+            present.missions,
+            read,
+        );
+        for name in names.all().filter(|name| (present.has)(&name.value)) {
+            let kind = ProblemKind::TakenName { name: name.value };
+            problems.add(kind, name.span);
+        }
         if !table.has("mission") {
             let message = "it names no mission: each begins with a line [[mission]]";
             problems.add(ProblemKind::BadEntry { message }, 0..0);
         }
         table.close();
         let problems = problems.into_vec();
-        if problems.is_empty() {
-            Ok(Self { rules, missions })
-        } else {
-            Err(invalid(problems))
-        }
+        let wrong = (!problems.is_empty()).then(|| invalid(problems));
+        (Self { rules, missions }, wrong)
     }
 }
 
@@ -85,19 +114,28 @@ pub(super) fn missions(
             .as_ref()
             .map(|path| file(&table, "goal", &path.value, read));
         let priority = table.get("priority").map_or(0, |priority| priority.value);
-        let deadline = table.get::<f64>("deadline").map(|deadline| deadline.value);
+        let seconds = |key| {
+            let given = table.has(key);
+            given.then(|| table.number(key, Bound::Seconds, 1.0))
+        };
+        let deadline = seconds("deadline");
+        let within = seconds("within");
         let preemption = table.get::<Preemption>("preemption");
         let preemption = preemption.map_or(Preemption::default(), |policy| policy.value);
         let period = table.get::<Period>("every").map(|period| period.value.0);
-        let within = table
-            .has("within")
-            .then(|| table.number("within", Bound::Positive, 1.0));
         let at = table.moment::<ClockTime>("at");
         let begins = match at {
-            Some(at) => next(begin, at),
+            Some(at) => next(begin, at, period),
             // Periods are counted from its first beginning.
             None => period.and_then(|_| time(begin)),
         };
+        if let (Some(begins), Some(now), Some(deadline)) = (begins, time(begin), deadline)
+            && begins.since(now) >= deadline
+        {
+            let message = "its deadline comes before it begins";
+            let kind = ProblemKind::BadEntry { message };
+            table.problems.add(kind, table.span_of("deadline"));
+        }
         let after = table.get::<String>("after");
         waits.extend(name.clone().map(|name| (name, after.clone())));
         if let (Some(name), Some(path), Some(goal)) = (name, path, goal) {
@@ -134,12 +172,15 @@ fn vain(name: &str, after: &str, waits: &[Wait], earlier: &[Earlier]) -> Option<
     let find = |name: &str| waits.iter().find(|(known, _)| known == name);
     if find(after).is_none() {
         let Some(known) = earlier.iter().find(|known| known.name == after) else {
-            let here = waits.iter().map(|(name, _)| name.as_str());
+            let here: BTreeSet<&str> = waits.iter().map(|(name, _)| name.as_str()).collect();
             let earlier = earlier.iter().map(|known| known.name.as_str());
+            let earlier = earlier
+                .filter(|name| !here.contains(name))
+                .collect::<Vec<_>>();
             return Some(ProblemKind::UnknownName {
                 kind: "mission",
                 name: after.to_owned(),
-                help: suggest(after, here.chain(earlier)),
+                help: suggest(after, here.iter().copied().chain(earlier)),
             });
         };
         let outcome = known.hopeless.clone()?;
@@ -163,11 +204,14 @@ fn vain(name: &str, after: &str, waits: &[Wait], earlier: &[Earlier]) -> Option<
     })
 }
 
-/// The first time after `begin`, or at it, that a clock shows `at`.
-fn next(begin: DateTime, at: ClockTime) -> Option<Time> {
+/// The first time after `begin`, or at it, that a clock shows `at`, or that is a whole number of periods after
+/// that time of this day.
+fn next(begin: DateTime, at: ClockTime, period: Option<f64>) -> Option<Time> {
     let today = time_of_day(begin.date(), at)?;
-    Some(if today < time(begin)? {
-        today + DAY
+    let late = time(begin)?.since(today);
+    let step = period.unwrap_or(DAY).min(DAY);
+    Some(if late > 0.0 {
+        today + (late / step).ceil() * step
     } else {
         today
     })
@@ -211,14 +255,19 @@ goal = "call.aggt"
             "rules.aggl" | "call.aggt" => Ok(path.to_owned()),
             _ => Err(std::io::Error::from(std::io::ErrorKind::NotFound)),
         };
-        let told = MissionFile::parse("round.toml", text, now, &earlier, &read);
-        told.map_err(|invalid| {
+        let present = Present {
+            now,
+            missions: &earlier,
+            has: &|name| name == "robot",
+        };
+        let (file, wrong) = MissionFile::parse("round.toml", text, present, &read);
+        wrong.map_or(Ok(file), |invalid| {
             let lines = invalid.problems.iter().map(|problem| {
                 let help = miette::Diagnostic::help(problem);
                 let help = help.map_or_else(String::new, |help| format!(" ({help})"));
                 format!("{}:{} {problem}{help}", problem.line, problem.column)
             });
-            lines.collect::<Vec<_>>().join("\n")
+            Err(lines.collect::<Vec<_>>().join("\n"))
         })
     }
 
@@ -253,20 +302,26 @@ goal = "call.aggt"
             .replace("rules.aggl", "rule.aggl")
             .replace("therapy", "terapy");
         let wrong = wrong + "\n[[mission]]\nnam = \"c\"\n";
+        let odd = "\n[[mission]]\nname = \"robot\"\ngoal = \"call.aggt\"\nat = \"11:00\"\n\
+            deadline = 20\nevery = 1e300\nwithin = 1e18\n";
         expect![[r#"
             2:9 cannot read `rule.aggl`: entity not found
             7:1 unknown key `prioritiy` in [[mission]] (did you mean `priority`?)
             8:12 `deadline` must be a number
             9:14 `preemption` must be "at_once", "between_steps" or "never"
             10:6 `25:00` is not a time of the day, as "10:30"
-            11:9 `every` must be "hour", "day", "week" or a number of seconds above 0
-            12:10 `within` must be more than 0
+            11:9 `every` must be "hour", "day", "week" or a number of seconds from 1 to 3.2e9
+            12:10 `within` must be more than 0 and at most 3.2e9 (seconds: a hundred years)
             13:9 there is no mission called `terapy` (did you mean `therapy`?)
             16:8 the name `call` is used twice (first used in line 5)
             19:1 [[mission]] lacks `name`
             19:1 [[mission]] lacks `goal`
-            20:1 unknown key `nam` in [[mission]] (did you mean `name`?)"#]]
-        .assert_eq(&parse(&wrong, 9.0).unwrap_err());
+            20:1 unknown key `nam` in [[mission]] (did you mean `name`?)
+            23:8 there is already a node `robot`
+            26:12 its deadline comes before it begins
+            27:9 `every` must be "hour", "day", "week" or a number of seconds from 1 to 3.2e9
+            28:10 `within` must be more than 0 and at most 3.2e9 (seconds: a hundred years)"#]]
+        .assert_eq(&parse(&(wrong + odd), 9.0).unwrap_err());
         expect!["1:1 it names no mission: each begins with a line [[mission]]"]
             .assert_eq(&parse("", 9.0).unwrap_err());
         expect!["1:11 unclosed array table, expected `]`"]

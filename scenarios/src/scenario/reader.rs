@@ -38,7 +38,12 @@ pub(super) enum Bound {
     NotNegative,
     Probability,
     FullTurn,
+    /// Seconds that a calendar can hold.
+    Seconds,
 }
+
+/// A hundred years, s.
+pub(super) const LONGEST: f64 = 3.2e9;
 
 impl Bound {
     /// What is allowed, where `value` is not.
@@ -48,6 +53,10 @@ impl Bound {
             Self::Positive => (value > 0.0, "more than 0"),
             Self::NotNegative => (value >= 0.0, "0 or more"),
             Self::Probability => ((0.0..=1.0).contains(&value), "from 0 to 1"),
+            Self::Seconds => (
+                value > 0.0 && value <= LONGEST,
+                "more than 0 and at most 3.2e9 (seconds: a hundred years)",
+            ),
             Self::FullTurn => {
                 let limit = std::f64::consts::TAU + 1e-3;
                 (

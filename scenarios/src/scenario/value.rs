@@ -1,6 +1,6 @@
 //! What a TOML value may be read as. A type says what it expects, for the diagnostic.
 
-use super::reader::Located;
+use super::reader::{LONGEST, Located};
 use jiff::civil::{DateTime, Time as ClockTime};
 use toml::de::DeValue;
 
@@ -62,7 +62,8 @@ impl Value for String {
 pub(super) struct Period(pub(super) f64);
 
 impl Value for Period {
-    const EXPECTED: &'static str = "\"hour\", \"day\", \"week\" or a number of seconds above 0";
+    const EXPECTED: &'static str =
+        "\"hour\", \"day\", \"week\" or a number of seconds from 1 to 3.2e9";
     fn read(value: &DeValue<'_>) -> Option<Self> {
         let seconds = match String::read(value).as_deref() {
             Some("hour") => Some(3600.0),
@@ -71,7 +72,9 @@ impl Value for Period {
             Some(_) => None,
             None => f64::read(value),
         };
-        seconds.filter(|seconds| *seconds > 0.0).map(Self)
+        seconds
+            .filter(|seconds| (1.0..=LONGEST).contains(seconds))
+            .map(Self)
     }
 }
 

@@ -23,7 +23,8 @@ struct Entry {
     value: Json,
 }
 
-fn oldest_time(newest: &Snapshot) -> Time {
+/// When the oldest version was made that is kept.
+pub(in crate::commands) fn oldest_time(newest: &Snapshot) -> Time {
     let oldest = newest.at(newest.oldest());
     oldest.map_or(newest.time(), |oldest| oldest.time())
 }

@@ -13,6 +13,7 @@ mod transform;
 mod watch;
 mod write;
 
+pub(super) use history::oldest_time;
 pub(crate) use history::rows as history_rows;
 pub(super) use path::{Path, Thing, last_with};
 pub(crate) use source::{Source, attach, name_of, no_such, read_graph};

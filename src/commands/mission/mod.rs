@@ -14,10 +14,13 @@ use executive::{Mission, MissionStatus, Request};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::sync::atomic::Ordering;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// How often a wait looks whether it was interrupted.
 const LOOK: Duration = Duration::from_millis(100);
+
+/// How long the executive may take to answer a request.
+const PATIENCE: Duration = Duration::from_secs(5);
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Failure> {
     let mut session = attach(&arguments.instance)?;
@@ -112,7 +115,7 @@ fn line(mission: &Mission, now: Time, all: &[Mission], width: usize) -> String {
     if let Some(deadline) = mission.deadline
         && !mission.status.is_over()
     {
-        let left = deadline.since(now);
+        let left = deadline.since(now).max(0.0);
         let _ = write!(line, "  {left:.0} s left, until {}", clock(deadline));
     }
     if !mission.reason.is_empty() {
@@ -190,18 +193,29 @@ fn ask(session: &mut Session, name: &str, request: Request) -> Result<Answer, Fa
     });
     commit(session, &transaction, snapshot.time())?;
     let asked = |mission: &Mission| mission.request.is_empty();
-    match follow(session, name, asked)? {
-        Some(mission) => {
+    match follow(session, name, Some(PATIENCE), asked)? {
+        Followed::Until(mission) => {
             print(&format!("mission {name} is {}\n", mission.status.name()))?;
             Ok(Answer::Yes)
         }
-        None => Ok(Answer::No),
+        Followed::TooLong => {
+            let word = request.name();
+            print(&format!(
+                "mission {name} is {}: the executive has not answered for {} s; it is asked to {word} the mission as \
+                soon as it does\n",
+                mission.status.name(),
+                PATIENCE.as_secs()
+            ))?;
+            Ok(Answer::No)
+        }
+        Followed::Gone => Ok(Answer::No),
     }
 }
 
 /// Waits until a mission is over; the answer is whether it succeeded.
 fn wait(session: &mut Session, name: &str, machine: bool) -> Result<Answer, Failure> {
-    let Some(mission) = follow(session, name, |mission| mission.status.is_over())? else {
+    let over = |mission: &Mission| mission.status.is_over();
+    let Followed::Until(mission) = follow(session, name, None, over)? else {
         return Ok(Answer::No);
     };
     let (snapshot, missions) = read(session)?;
@@ -218,13 +232,28 @@ fn wait(session: &mut Session, name: &str, machine: bool) -> Result<Answer, Fail
     })
 }
 
-/// The mission as soon as it is as wanted; `None` where it or the instance is gone, or the user
-/// interrupted.
+/// What came of following a mission.
+enum Followed {
+    /// It is as wanted.
+    Until(Box<Mission>),
+    /// It is not, and patience is over.
+    TooLong,
+    /// It or the instance is gone, or the user interrupted.
+    Gone,
+}
+
+/// Waits until the mission is as wanted, for so long at the most.
 fn follow(
     session: &mut Session,
     name: &str,
+    patience: Option<Duration>,
     wanted: impl Fn(&Mission) -> bool,
-) -> Result<Option<Mission>, Failure> {
+) -> Result<Followed, Failure> {
+    #[allow(
+        clippy::disallowed_methods,
+        reason = "an executive that stands still answers never"
+    )]
+    let started = Instant::now();
     let interrupted = super::interruption()?;
     let mut changes = session
         .changes(Filter::default())
@@ -232,10 +261,13 @@ fn follow(
     while !interrupted.load(Ordering::Acquire) && session.instance().exists() {
         let (_, missions) = read(session)?;
         let Some(mission) = missions.into_iter().find(|mission| mission.name == name) else {
-            return Ok(None);
+            return Ok(Followed::Gone);
         };
         if wanted(&mission) {
-            return Ok(Some(mission));
+            return Ok(Followed::Until(Box::new(mission)));
+        }
+        if patience.is_some_and(|patience| started.elapsed() > patience) {
+            return Ok(Followed::TooLong);
         }
         changes.wait(LOOK).map_err(Failure::internal)?;
         let snapshot = session.snapshot().map_err(Failure::internal)?;
@@ -245,5 +277,5 @@ fn follow(
             .is_some()
         {}
     }
-    Ok(None)
+    Ok(Followed::Gone)
 }

@@ -9,9 +9,10 @@ use crate::{Answer, Failure};
 use dsr::{Session, Snapshot, Time, Transaction};
 use executive::{MissionSpec, Preemption, Schedule};
 use grammar::{Defects, Diagnostic, SourceFile};
-use scenarios::scenario::{Earlier, Mission, MissionFile};
+use scenarios::scenario::{Earlier, Mission, MissionFile, Present};
 use serde_json::json;
 use std::path::Path;
+use thiserror::Error;
 
 pub(super) fn run(
     session: &mut Session,
@@ -68,6 +69,14 @@ fn of_goal(snapshot: &Snapshot, submit: &SubmitMission) -> Result<MissionSpec, F
     let stem = submit.file.file_stem().map(|stem| stem.to_string_lossy());
     let name = submit.name.clone().or(stem.map(Into::into));
     let name = name.ok_or_else(|| Failure::input("give the mission a --name"))?;
+    if name.is_empty() || name.contains(|c: char| c == '/' || c.is_whitespace() || c.is_control()) {
+        return Err(Failure::input_with_help(
+            format!(
+                "`{name}` cannot be a mission's name: its steps and their paths could not be told"
+            ),
+            "give it a --name without spaces and `/`",
+        ));
+    }
     check_goal(&goal, &submit.file.display().to_string(), snapshot)?;
     let policy = |policy: &Preemption| policy.name() == submit.preemption;
     let preemption = Preemption::ALL.into_iter().find(policy);
@@ -79,6 +88,20 @@ fn of_goal(snapshot: &Snapshot, submit: &SubmitMission) -> Result<MissionSpec, F
         preemption: preemption.unwrap_or_default(),
         schedule: Schedule::default(),
     })
+}
+
+/// All that is wrong with a mission file, and with the files that it names.
+#[derive(Debug, Error)]
+#[error("the missions of {file} cannot be submitted")]
+struct Wrong {
+    file: String,
+    related: Vec<Box<dyn miette::Diagnostic + Send + Sync>>,
+}
+
+impl miette::Diagnostic for Wrong {
+    fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn miette::Diagnostic> + 'a>> {
+        Some(Box::new(self.related.iter().map(|one| &**one as _)))
+    }
 }
 
 /// The missions of a file; what puts its rules in force becomes a part of the transaction.
@@ -94,13 +117,21 @@ fn of_file(
         name: mission.name,
     });
     let earlier: Vec<Earlier> = earlier.collect();
+    let present = Present {
+        now,
+        missions: &earlier,
+        has: &|name| matches!(snapshot.find_node_by_name(name), Ok(Some(_))),
+    };
     let folder = path.parent().unwrap_or(Path::new(""));
     let name = path.display().to_string();
     let read = |name: &str| std::fs::read_to_string(folder.join(name));
-    let file = MissionFile::parse(&name, &read_text(path)?, now, &earlier, &read)
-        .map_err(|invalid| Failure::Input((*invalid).into()))?;
+    let (file, wrong) = MissionFile::parse(&name, &read_text(path)?, present, &read);
+    // What could not be read has no text, and is told of already.
+    let is_read = |text: &str| wrong.is_none() || !text.is_empty();
     let mut diagnostics = Vec::new();
-    if let Some((rules, text)) = &file.rules {
+    if let Some((rules, text)) = &file.rules
+        && is_read(text)
+    {
         let (grammar, defects) = read_grammar(text, &folder.join(rules));
         diagnostics.extend(defects);
         diagnostics.extend(grammar.check_schema(snapshot.schema()));
@@ -108,12 +139,27 @@ fn of_file(
             *transaction = grammar.publish(snapshot).map_err(Failure::internal)?;
         }
     }
-    for mission in &file.missions {
+    for mission in file
+        .missions
+        .iter()
+        .filter(|mission| is_read(&mission.goal))
+    {
         let path = folder.join(&mission.file).display().to_string();
         diagnostics.extend(goal_defects(&mission.goal, &path, snapshot));
     }
+    let mut related: Vec<Box<dyn miette::Diagnostic + Send + Sync>> = Vec::new();
+    if let Some(wrong) = wrong {
+        related.push(wrong);
+    }
     if grammar::has_errors(&diagnostics) {
-        return Err(Failure::Input(Defects { diagnostics }.into()));
+        related.push(Box::new(Defects { diagnostics }));
+    }
+    if !related.is_empty() {
+        let wrong = Wrong {
+            file: name,
+            related,
+        };
+        return Err(Failure::Input(wrong.into()));
     }
     Ok(file.missions.iter().map(|one| spec(one, now)).collect())
 }

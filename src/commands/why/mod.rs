@@ -4,7 +4,7 @@
 
 mod written;
 
-use super::graph::{Path, Thing, attach};
+use super::graph::{Path, Thing, attach, oldest_time};
 use super::output::{clock, print, print_json};
 use crate::cli::Why as Arguments;
 use crate::{Answer, Failure};
@@ -93,8 +93,15 @@ fn tell(snapshot: &Snapshot, what: Option<&str>) -> Result<Told, Untold> {
             return known.step(mission, step);
         }
     }
-    let (Path { thing, attribute }, gone) =
-        Path::find_kept(snapshot, what).map_err(Untold::Said)?;
+    let missing = |missing: Failure| {
+        let kept = snapshot.time().since(oldest_time(snapshot));
+        let help = format!(
+            "what was removed more than {kept:.0} s ago, before version {}, is not kept; see `cortex graph history`",
+            snapshot.oldest()
+        );
+        Untold::Said(missing.with_help(&help))
+    };
+    let (Path { thing, attribute }, gone) = Path::find_kept(snapshot, what).map_err(missing)?;
     match (gone, attribute) {
         (Some(last), _) => known.gone(thing, &last),
         (None, Some(attribute)) => known.attribute(thing, &attribute),

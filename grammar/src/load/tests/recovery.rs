@@ -21,7 +21,7 @@ strict c active(1) wings(4)
 	{ p:t } => { q:t p->p(l) }
 }
 ",
-        &expect![[r#"
+        &expect![[r"
             f.aggl:3:1: error: expected `dormant`, `hierarchical`, `strict` or a rule's name, found `dormnat` (did you mean `dormant`?)
             f.aggl:3:9: error: expected `dormant`, `hierarchical`, `strict` or a rule's name, found `strct` (did you mean `strict`?)
             f.aggl:3:19: error: expected `active` or `passive`, found `actve` (did you mean `active`?)
@@ -38,7 +38,7 @@ strict c active(1) wings(4)
             f.aggl:11:10: error: expected `:` after the rule's name, found `active`
             f.aggl:11:20: error: expected `{`, `success`, `activates`, `cost`, `duration` or `agent`, found `wings`
             f.aggl:13:19: error: no variable `p` on the right side (did you mean `q`?)
-            f.aggl:13:22: error: no variable `p` on the right side (did you mean `q`?)"#]],
+            f.aggl:13:22: error: no variable `p` on the right side (did you mean `q`?)"]],
     );
 }
 
@@ -64,7 +64,7 @@ b : active(1)
 }
 c : actve(1) { { p:t } => { p:u p->z(l) } }
 ",
-        &expect![[r#"
+        &expect![[r"
             f.aggl:6:2: error: expected `=>` between the two sides, found `->`
             f.aggl:8:2: error: expected `parameters`, `precondition`, `effect` or `}`, found `paramters` (did you mean `parameters`?)
             f.aggl:8:18: error: variable `q` is declared twice
@@ -79,7 +79,7 @@ c : actve(1) { { p:t } => { p:u p->z(l) } }
             f.aggl:17:2: error: expected `parameters`, `precondition`, `effect` or `}`, found `precondtion` (did you mean `precondition`?)
             f.aggl:17:21: error: no variable `z` on the left side or among the parameters (did you mean `p`?)
             f.aggl:19:5: error: expected `active` or `passive`, found `actve` (did you mean `active`?)
-            f.aggl:19:36: error: no variable `z` on the right side (did you mean `p`?)"#]],
+            f.aggl:19:36: error: no variable `z` on the right side (did you mean `p`?)"]],
     );
 }
 
@@ -101,7 +101,7 @@ none : active(1) { }
 empty : active(1) { where: }
 colon : active(1) { go as one go as two where one.r = two.q }
 ",
-        &expect![[r#"
+        &expect![[r"
             f.aggl:4:1: error: a combo has no `dormant`, but the rules that are its steps may
             f.aggl:4:27: error: a combo has no `success`, but the rules that are its steps may
             f.aggl:4:40: error: a combo has no `cost`, but the rules that are its steps may
@@ -114,7 +114,7 @@ colon : active(1) { go as one go as two where one.r = two.q }
             f.aggl:13:20: error: expected `{` and the left side, or a step `rule as alias`, found `}`
             f.aggl:14:19: error: expected a step `rule as alias`, found none
             f.aggl:15:47: error: expected `:` after `where`, found `one`
-            f.aggl:15:59: error: no variable `q` in the rule of this step (did you mean `a`?)"#]],
+            f.aggl:15:59: error: no variable `q` in the rule of this step (did you mean `a`?)"]],
     );
 }
 
@@ -139,12 +139,12 @@ fn names_that_a_missing_file_may_declare_are_told_once() {
         "name=x\n===\ntypes { (room) }\n===\ninclude(one.aggl)\n\
          r : active(1) activates(s, rr) { { a:rom } => { a:rom } }\n\
          c : active(1) { r as x s as y where: x.a = x.b }\n",
-        &expect![[r#"
+        &expect![[r"
             f.aggl:5:9: error: cannot read the included file `one.aggl`: no other files are at hand
             f.aggl:6:25: warning: no rule `s` in the files that could be read: one that is missing may declare it (did you mean `c`?)
             f.aggl:6:28: warning: no rule `rr` in the files that could be read: one that is missing may declare it (did you mean `r`?)
             f.aggl:6:38: warning: no type `rom` in the files that could be read: one that is missing may declare it (did you mean `room`?)
-            f.aggl:7:46: error: no variable `b` in the rule of this step (did you mean `a`?)"#]],
+            f.aggl:7:46: error: no variable `b` in the rule of this step (did you mean `a`?)"]],
     );
 }
 
