@@ -106,7 +106,7 @@ impl Cell {
         }
     }
 
-    fn agrees(&self) -> bool {
+    pub(super) fn agrees(&self) -> bool {
         match (&self.ours, &self.printed) {
             (_, None) => true,
             (Figure::Number(ours), Some(Figure::Number(printed))) => {
