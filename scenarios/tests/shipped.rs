@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 const TICK: f64 = 0.05;
-const SHIPPED: [&str; 8] = [
+const SHIPPED: [&str; 9] = [
     "apartment",
     "care-centre",
     "company",
@@ -17,6 +17,7 @@ const SHIPPED: [&str; 8] = [
     "flat",
     "home",
     "plaza",
+    "reception",
     "therapy-centre",
 ];
 

@@ -52,6 +52,28 @@ fn the_same_seed_gives_the_same_report_byte_for_byte() {
 }
 
 #[test]
+fn a_group_a_thing_and_a_pose_are_gone_to_as_planned() {
+    let arguments = [
+        "scenarios/reception",
+        "--lockstep",
+        "--seed",
+        "1",
+        "--no-baseline",
+    ];
+    let folder = Run::new("reception", &arguments).succeed();
+    let (_, report) = report(folder.path());
+    assert_eq!(report["success"], true);
+    assert_eq!(report["robot"]["collisions"], 0);
+    assert!(report["psi"]["intimate"].as_f64().unwrap() <= 0.0);
+    let steps = report["plan"].as_array().unwrap().iter();
+    let done: Vec<&str> = steps
+        .filter(|step| step["status"] == "done")
+        .map(|step| step["rule"].as_str().unwrap())
+        .collect();
+    assert_eq!(done, ["approachGroup", "goToObject", "goToPose"]);
+}
+
+#[test]
 fn all_that_the_robot_does_with_people_is_planned_and_done() {
     let arguments = [
         "scenarios/company",

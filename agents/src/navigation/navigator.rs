@@ -439,12 +439,13 @@ impl Navigator {
                 .then_some((STAND, Status::Arrived));
         }
         let destination = course.destination?;
-        if course.task.target.person().is_some() {
-            let person = person_of(&course.task, view.inputs.people)?;
+        if course.task.target.follows_people() {
+            let anchor = course.task.target.anchor(view.inputs.people)?;
             if let Target::Company { until, .. } = &course.task.target {
+                let person = person_of(&course.task, view.inputs.people)?;
                 return self.company(course, view, person, until.as_ref());
             }
-            if has_moved(course.person, person.position()) {
+            if has_moved(course.person, anchor) {
                 return None;
             }
         }

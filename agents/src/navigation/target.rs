@@ -2,6 +2,10 @@
 //! in front of a person, or the place itself. This file guarantees that a place offered in a room
 //! lies inside it, and one offered for a person lies outside their personal space.
 
+mod join;
+
+pub use join::{places_before, places_to_join};
+
 use super::people::{PERSONAL, Person};
 use crate::grid::CostGrid;
 use crate::social_mapping::AsymmetricGaussian;
@@ -23,6 +27,13 @@ pub enum Target {
     Point(Point2<f64>),
     /// A point and a heading.
     Pose(Isometry2<f64>),
+    /// One of some places, the first that can be reached.
+    Places(Vec<Destination>),
+    /// Among people who stand together, facing their middle, outside the personal space of each.
+    Group {
+        /// Their names.
+        members: Vec<String>,
+    },
     /// In front of a person, facing them.
     Person {
         /// The name of the person.
@@ -77,8 +88,28 @@ impl Target {
     pub fn person(&self) -> Option<&str> {
         match self {
             Self::Person { name, .. } | Self::Company { name, .. } => Some(name),
-            Self::Region { .. } | Self::Point(_) | Self::Pose(_) => None,
+            Self::Region { .. }
+            | Self::Point(_)
+            | Self::Pose(_)
+            | Self::Places(_)
+            | Self::Group { .. } => None,
         }
+    }
+
+    /// Whether it depends on where people are.
+    pub fn follows_people(&self) -> bool {
+        self.person().is_some() || matches!(self, Self::Group { .. })
+    }
+
+    /// Where those are whom it depends on: the person, or the middle of those of a group who are known.
+    pub fn anchor(&self, people: &[Person]) -> Option<Point2<f64>> {
+        if let Self::Group { members } = self {
+            let known = people.iter().filter(|p| members.contains(&p.name));
+            return join::middle(known);
+        }
+        let name = self.person()?;
+        let person = people.iter().find(|person| person.name == name);
+        person.map(Person::position)
     }
 
     /// Whether it moves with the person.

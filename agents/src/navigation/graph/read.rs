@@ -6,7 +6,7 @@ use crate::navigation::control::{Base, Limits};
 use crate::navigation::map_age::{MapPatience, MapState};
 use crate::navigation::obstacles::Wall;
 use crate::navigation::people::Person;
-use crate::navigation::target::{Company, End, Target};
+use crate::navigation::target::{Company, End, Target, places_before};
 use dsr::{EdgeKey, Node, NodeId, ReadError, Snapshot, Time, Value, pose_on_floor};
 use nalgebra::{Isometry2, Point2, Vector2};
 use std::collections::BTreeMap;
@@ -338,10 +338,51 @@ pub(super) fn work(
                 }),
             },
         },
+        "goToPose" => match bound_of_type(snapshot, step, "place")? {
+            None => Err(unbound("place")),
+            Some(place) => match place_of(snapshot, place.id())? {
+                Some(pose) => Ok(Work::Drive(Target::Pose(pose))),
+                None => Err(StepError::Nowhere {
+                    node: place.name()?,
+                }),
+            },
+        },
+        "goToObject" => match bound_of_type(snapshot, step, "object")? {
+            None => Err(unbound("object")),
+            Some(object) => match place_of(snapshot, object.id())? {
+                Some(pose) => {
+                    let size = vector(&object, "size")?.unwrap_or_default();
+                    let places = places_before(&pose, size, world.robot.limits.radius);
+                    Ok(Work::Drive(Target::Places(places)))
+                }
+                None => Err(StepError::Nowhere {
+                    node: object.name()?,
+                }),
+            },
+        },
+        "approachGroup" => match bound_of_type(snapshot, step, "group")? {
+            None => Err(unbound("group")),
+            Some(group) => Ok(Work::Drive(Target::Group {
+                members: members(snapshot, &group)?,
+            })),
+        },
         rule => Err(StepError::UnknownRule {
             rule: rule.to_owned(),
         }),
     })
+}
+
+/// The names of those who are in a group.
+fn members(snapshot: &Snapshot, group: &Node) -> Result<Vec<String>, ReadError> {
+    let mut names = Vec::new();
+    if let Some(label) = snapshot.schema().find_label("member_of") {
+        for edge in group.in_edges_of(label) {
+            if let Some(person) = snapshot.find_node(edge?.from)? {
+                names.push(person.name()?);
+            }
+        }
+    }
+    Ok(names)
 }
 
 /// Where a way together to the room of that name ends.

@@ -2,6 +2,7 @@
 
 mod map_age;
 mod people;
+mod places;
 
 use super::people::ASKING;
 use super::*;
@@ -60,7 +61,9 @@ impl RuleEngine for Rules {
             "wait" => work.create_edge(node("p")?, "in", node("room")?),
             "escort" => work.create_edge(node("p")?, "in", node("room2")?),
             "follow" => work.create_edge(node("robot")?, "followed", node("p")?),
-            "goToPlace" => work.create_edge(node("robot")?, "at", node("place")?),
+            "goToObject" => work.create_edge(node("robot")?, "before", node("object")?),
+            "approachGroup" => work.create_edge(node("robot")?, "joined", node("group")?),
+            "goToPlace" | "goToPose" => work.create_edge(node("robot")?, "at", node("place")?),
             _ => return Err(refuse("no such rule")),
         }
         Ok(work.operations)

@@ -8,7 +8,7 @@ use crate::navigation::band::Band;
 use crate::navigation::people::{Person, Presence};
 use crate::navigation::planner::price;
 use crate::navigation::target::{
-    Destination, Target, Task, has_moved, places_to_talk, places_with,
+    Destination, Target, Task, has_moved, places_to_join, places_to_talk, places_with,
 };
 use nalgebra::Point2;
 
@@ -21,7 +21,8 @@ impl Navigator {
         view: &View,
     ) -> Result<(), Hindrance> {
         let person = person_of(&course.task, view.inputs.people);
-        if person.is_none() && course.task.target.person().is_some() {
+        let anchor = course.task.target.anchor(view.inputs.people);
+        if anchor.is_none() && course.task.target.follows_people() {
             return Err(Hindrance::NoPerson);
         }
         let age = course
@@ -31,7 +32,7 @@ impl Navigator {
         if age < if company { 0.3 } else { 0.5 } {
             return course.hindrance.map_or(Ok(()), Err);
         }
-        let moved = person.is_some_and(|person| has_moved(course.person, person.position()));
+        let moved = anchor.is_some_and(|anchor| has_moved(course.person, anchor));
         let now = price(grid, self.band.points());
         course.price = course.price.min(now.cost);
         if company {
@@ -104,7 +105,7 @@ impl Navigator {
         course.planned = Some(view.now);
         let robot = view.robot.position;
         self.load(grid, view, care);
-        let found = self.line(course, grid, robot, person);
+        let found = self.line(course, grid, view, person);
         course.hindrance = found.as_ref().err().copied();
         let (destination, line) = found?;
         course.hindered = None;
@@ -113,9 +114,9 @@ impl Navigator {
             point: line_end,
             ..destination
         });
-        let led_elsewhere =
-            person.is_some_and(|person| has_moved(course.person, person.position()));
-        course.person = person.map_or(robot, Person::position);
+        let anchor = course.task.target.anchor(view.inputs.people);
+        let led_elsewhere = anchor.is_some_and(|anchor| has_moved(course.person, anchor));
+        course.person = anchor.unwrap_or(robot);
         course.at_place = false;
         self.band = Band::new(&line, &self.config.gains);
         self.relax(grid, view, 20);
@@ -137,9 +138,10 @@ impl Navigator {
         &mut self,
         course: &Course,
         grid: &CostGrid,
-        robot: Point2<f64>,
+        view: &View,
         person: Option<&Person>,
     ) -> Result<(Destination, Vec<Point2<f64>>), Hindrance> {
+        let robot = view.robot.position;
         let single = |point, heading| vec![(Destination { point, heading }, 1.0)];
         let places = match (&course.task.target, person) {
             (Target::Region { entry, .. }, _) => {
@@ -157,6 +159,13 @@ impl Navigator {
             (Target::Point(point), _) => single(*point, None),
             (Target::Pose(pose), _) => {
                 single(pose.translation.vector.into(), Some(pose.rotation.angle()))
+            }
+            (Target::Places(places), _) => places.iter().map(|place| (*place, 0.15)).collect(),
+            (Target::Group { members }, _) => {
+                let people = view.inputs.people.iter();
+                let members: Vec<&Person> = people.filter(|p| members.contains(&p.name)).collect();
+                let places = places_to_join(&members, robot).into_iter();
+                places.map(|place| (place, 0.05)).collect()
             }
             (Target::Person { .. } | Target::Company { .. }, None) => {
                 return Err(Hindrance::NoPerson);
