@@ -24,6 +24,7 @@ pub use conflict::{CONFLICT_LIMIT, Conflict, Conflicts, EFFORT_LIMIT, OVERLAY_LI
 use crate::parser::Finding;
 use crate::{Diagnostic, Grammar, Name, Problem, SourceFile};
 use dsr::{Manifest, ReadError, Schema, Snapshot};
+use std::collections::BTreeSet;
 
 /// A finding at a name.
 fn at(name: &Name, problem: Problem) -> Finding {
@@ -49,6 +50,8 @@ impl Grammar {
     /// ```
     pub fn analyse(&self, schema: Option<&Schema>) -> Vec<Diagnostic> {
         let mut findings = Vec::new();
+        let woken = self.rules.iter().flat_map(|rule| &rule.activates);
+        let woken: BTreeSet<&Name> = woken.collect();
         for rule in &self.rules {
             if let Some(reason) = never::why_never(self, rule, schema) {
                 findings.push(at(&rule.name, Problem::NeverMatches { reason }));
@@ -57,8 +60,7 @@ impl Grammar {
             }
             unused::variables(rule, &mut findings);
             adrift::links(rule, &mut findings);
-            let wakes = |other: &crate::Rule| other.activates.contains(&rule.name);
-            if rule.dormant && !self.rules.iter().any(wakes) {
+            if rule.dormant && !woken.contains(&rule.name) {
                 let reason = "it is dormant, and no rule activates it".to_owned();
                 findings.push(at(&rule.name, Problem::Unreachable { reason }));
             }

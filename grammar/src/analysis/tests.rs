@@ -228,6 +228,19 @@ flee : active(1) { { h:hen h->h(up) } => { } }
 }
 
 #[test]
+fn rules_with_many_variables_within_each_other_are_not_compared() {
+    let variables: String = (0..20_000)
+        .map(|n| ["v", &n.to_string(), ":t "].concat())
+        .collect();
+    let text = format!(
+        "name=x\n===\nr : active(1) {{ {{ a:t }} => {{ a:t a->a(l) }} precondition {{ (forall {variables} (not (l v0 v1))) }} }}"
+    );
+    let found = read(&text).conflicts(None, crate::EFFORT_LIMIT);
+    let pair = ("r".to_owned(), "r".to_owned(), crate::Undecided::Size);
+    assert_eq!((found.found.len(), found.undecided), (0, vec![pair]));
+}
+
+#[test]
 fn links_and_values_that_no_schema_allows_are_told() {
     let schema = r#"
         [types]

@@ -5,7 +5,6 @@
 
 use super::Check;
 use crate::{Combo, ComboVariable, Grammar, PatternNode, Problem, Rule};
-use dsr::suggest;
 
 impl Check<'_> {
     pub(super) fn combo(&mut self, grammar: &Grammar, combo: &Combo) {
@@ -38,7 +37,8 @@ impl Check<'_> {
         part: &ComboVariable,
     ) -> Option<&'g PatternNode> {
         let Some(step) = combo.steps.iter().find(|step| step.alias == part.alias) else {
-            let suggestion = suggest(&part.alias, combo.steps.iter().map(|step| &*step.alias));
+            let suggestion =
+                self.suggestion(&part.alias, combo.steps.iter().map(|step| &*step.alias));
             let name = part.alias.to_string();
             self.report(
                 &part.alias,
@@ -53,7 +53,8 @@ impl Check<'_> {
         let rule = grammar.rule(&step.rule)?;
         let node = variables(rule).find(|node| node.variable == part.variable);
         if node.is_none() {
-            let suggestion = suggest(&part.variable, variables(rule).map(|node| &*node.variable));
+            let suggestion =
+                self.suggestion(&part.variable, variables(rule).map(|node| &*node.variable));
             let (name, scope) = (part.variable.to_string(), "in the rule of this step");
             self.report(
                 &part.variable,

@@ -12,6 +12,7 @@ use crate::parser::{Action, Broken, Finding};
 use crate::{Goal, Grammar, Name, Pattern, PatternEdge, PatternNode, Problem, Rule, Types};
 use dsr::suggest;
 use scope::Scope;
+use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Checks the rules and combos against each other and the types.
@@ -25,6 +26,7 @@ pub(crate) fn check_grammar(grammar: &Grammar, broken: &[Broken], missing: bool)
         missing,
         rules: rule_names(grammar, broken),
         not_read: BTreeSet::new(),
+        suggesting: Cell::new(SUGGESTING),
         findings: Vec::new(),
     };
     check.type_declarations();
@@ -69,6 +71,7 @@ pub(crate) fn check_goal(goal: &Goal, types: &Types, lost: &[Name]) -> Vec<Findi
         missing: false,
         rules: Vec::new(),
         not_read: BTreeSet::new(),
+        suggesting: Cell::new(SUGGESTING),
         findings: Vec::new(),
     };
     check.pattern(&goal.pattern, &[], "left", "in this goal");
@@ -81,6 +84,10 @@ pub(crate) fn check_goal(goal: &Goal, types: &Types, lost: &[Name]) -> Vec<Findi
     check.findings
 }
 
+/// So much is done to find what was probably meant, in pairs of letters that are compared: in a file of nothing but mistakes
+/// each name would be held against all others.
+const SUGGESTING: u64 = 100_000_000;
+
 struct Check<'a> {
     types: &'a Types,
     missing: bool,
@@ -88,10 +95,24 @@ struct Check<'a> {
     rules: Vec<Name>,
     /// What was told to be in no file that could be read, each name once.
     not_read: BTreeSet<(&'static str, Name)>,
+    /// What is left of [`SUGGESTING`].
+    suggesting: Cell<u64>,
     findings: Vec<Finding>,
 }
 
 impl Check<'_> {
+    /// What was probably meant.
+    fn suggestion<'n>(&self, name: &str, known: impl Iterator<Item = &'n str>) -> Option<String> {
+        let affordable = |known: &&str| {
+            let cost = 16 + (name.len() * known.len()) as u64;
+            let left = self.suggesting.get().checked_sub(cost);
+            self.suggesting.set(left.unwrap_or(0));
+            left.is_some()
+        };
+        let found = suggest(name, known.take_while(affordable));
+        found.filter(|_| self.suggesting.get() > 0)
+    }
+
     fn report(&mut self, at: &Name, problem: Problem) {
         self.findings.push(Finding {
             span: at.span(),
@@ -148,7 +169,7 @@ impl Check<'_> {
         if self.missing || declared.any(|declared| *name == *declared) {
             return;
         }
-        if let Some(suggestion) = suggest(name, self.types.names().map(Name::as_str)) {
+        if let Some(suggestion) = self.suggestion(name, self.types.names().map(Name::as_str)) {
             self.report(
                 name,
                 Problem::UndeclaredParent {
@@ -164,7 +185,7 @@ impl Check<'_> {
             return;
         }
         let known = self.types.names().chain(self.types.undeclared());
-        let suggestion = suggest(name, known.map(Name::as_str));
+        let suggestion = self.suggestion(name, known.map(Name::as_str));
         if self.missing {
             return self.not_read("type", name, suggestion);
         }
@@ -209,7 +230,7 @@ impl Check<'_> {
         if self.rules.binary_search(name).is_ok() {
             return;
         }
-        let suggestion = suggest(name, self.rules.iter().map(Name::as_str));
+        let suggestion = self.suggestion(name, self.rules.iter().map(Name::as_str));
         if self.missing {
             return self.not_read("rule", name, suggestion);
         }
@@ -297,7 +318,7 @@ impl Check<'_> {
             );
             return;
         }
-        let suggestion = suggest(name, scope.names());
+        let suggestion = self.suggestion(name, scope.names());
         let (name_text, scope) = (name.to_string(), scope.words());
         self.report(
             name,

@@ -16,7 +16,7 @@ use dsr::{Graph, Operation, Schema, Time, Transaction};
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
-/// Rules with more nodes than this are not compared.
+/// Rules with more nodes than this, or quantifiers over so many within each other, are not compared.
 const NODE_LIMIT: usize = 48;
 /// So many graphs to be tried are kept for two rules.
 const DRAFT_LIMIT: usize = 4_096;
@@ -87,17 +87,13 @@ impl<'a> Pair<'_, 'a> {
         effort: &mut Effort,
     ) -> Result<Option<Conflict>, Undecided> {
         let both = [self.first, self.second];
-        if both
-            .map(|rule| rule.bound_nodes().count())
-            .iter()
-            .sum::<usize>()
-            > NODE_LIMIT
-        {
+        let nodes = both.map(|rule| rule.bound_nodes().count());
+        let depth = self.changes.depth.max(self.looks.depth);
+        if nodes[0] + nodes[1] > NODE_LIMIT || depth as usize > NODE_LIMIT {
             return Err(Undecided::Size);
         }
         effort.spend(self.changes.checks(self.looks) * kinds.words())?;
         let needs = self.changes.needs(kinds, self.looks);
-        let depth = self.changes.depth.max(self.looks.depth);
         let Some(sides) = Sides::new(kinds, both, &needs) else {
             // No node can be of all the types of a variable.
             return Ok(None);

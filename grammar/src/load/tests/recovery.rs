@@ -162,3 +162,19 @@ fn a_misspelt_block_of_a_goal_is_checked() {
     expect!["g.aggt:1:13: error: expected `precondition` or the end of the goal, found `}`"]
         .assert_eq(&told("{ r:robot } }").to_string());
 }
+
+#[test]
+fn what_was_meant_is_no_longer_looked_for_where_nearly_every_name_is_unknown() {
+    let all = |each: &dyn Fn(usize) -> String| (0..3_000).map(each).collect::<Vec<_>>().concat();
+    let (nodes, links) = (
+        all(&|n| format!("a{n}:t ")),
+        all(&|n| format!("b{n}->a{n}(l) ")),
+    );
+    let text = format!("name=x\n===\nr : active(1) {{ {{ {nodes} {links} }} => {{ }} }}\n");
+    let (_, found) = crate::parse_grammar(&text, "f.aggl");
+    let help: Vec<bool> = found
+        .iter()
+        .map(|found| found.problem.help().is_some())
+        .collect();
+    assert_eq!((help.len(), help[0], help[2_999]), (3_000, true, false));
+}
