@@ -3,7 +3,8 @@
 //! the other parts of the navigation believe.
 
 use super::obstacles::hits;
-use crate::messages::LaserScan;
+use crate::messages::{LaserScan, VelocityCommand};
+use dsr::Time;
 use nalgebra::{Isometry2, Point2, Rotation2, Vector2, distance};
 
 /// How a base moves, in its own frame.
@@ -18,6 +19,16 @@ pub struct Motion {
 }
 
 impl Motion {
+    /// As a command to the base.
+    pub const fn command(self, time: Time) -> VelocityCommand {
+        VelocityCommand {
+            time,
+            linear: self.linear,
+            lateral: self.lateral,
+            angular: self.angular,
+        }
+    }
+
     /// Forwards and turning.
     pub const fn new(linear: f64, angular: f64) -> Self {
         Self {

@@ -245,12 +245,7 @@ impl Navigator {
         } else {
             status
         };
-        let command = VelocityCommand {
-            time: now,
-            linear: motion.linear,
-            lateral: motion.lateral,
-            angular: motion.angular,
-        };
+        let command = motion.command(now);
         self.last = Some(command);
         Output { command, status }
     }
@@ -274,12 +269,7 @@ impl Navigator {
             Err(cause) => (STAND, Status::Waiting(cause)),
             Ok((wanted, now)) => (inputs.limits.reachable(now, wanted, 0.1), Status::Moving),
         };
-        let command = VelocityCommand {
-            time: now,
-            linear: motion.linear,
-            lateral: motion.lateral,
-            angular: motion.angular,
-        };
+        let command = motion.command(now);
         self.last = Some(command);
         Output { command, status }
     }

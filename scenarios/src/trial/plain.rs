@@ -86,12 +86,7 @@ impl Plain {
                 self.drive(now, odometry, scan, grid, inputs)
             }
         };
-        let command = VelocityCommand {
-            time: now,
-            linear: motion.linear,
-            lateral: motion.lateral,
-            angular: motion.angular,
-        };
+        let command = motion.command(now);
         self.last = Some(command);
         Output { command, status }
     }
