@@ -106,6 +106,14 @@ pub enum Problem {
         /// What it is.
         found: String,
     },
+    /// A rule that binds more nodes than [`crate::NODE_LIMIT`].
+    #[error("a rule binds at most {limit} nodes, and this one {found}")]
+    TooLarge {
+        /// The limit.
+        limit: usize,
+        /// How many it binds.
+        found: usize,
+    },
     /// Formulas nested deeper than [`crate::DEPTH_LIMIT`].
     #[error("nested more than {limit} deep")]
     TooDeep {

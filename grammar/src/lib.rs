@@ -93,6 +93,7 @@ mod unfold;
 pub use analysis::{CONFLICT_LIMIT, Conflict, Conflicts, EFFORT_LIMIT, OVERLAY_LIMIT, Undecided};
 pub use apply::{ApplyError, CHANGE_LIMIT};
 pub use binding::Binding;
+pub use check::NODE_LIMIT;
 pub use diagnostic::{Diagnostic, Problem, Severity};
 pub use goal::GoalConstants;
 pub use grammar::{

@@ -11,6 +11,7 @@ mod scope;
 use crate::parser::{Action, Broken, Finding};
 use crate::{Goal, Grammar, Name, Pattern, PatternEdge, PatternNode, Problem, Rule, Types};
 use dsr::suggest;
+pub use scope::NODE_LIMIT;
 use scope::Scope;
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};

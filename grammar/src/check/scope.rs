@@ -7,6 +7,9 @@ use crate::{AttributePath, Condition, Effect, Expression, Name, PatternNode, Pro
 use dsr::suggest;
 use std::collections::{BTreeMap, BTreeSet};
 
+/// No rule binds more nodes: a match keeps each apart from all others, which takes memory by their square.
+pub const NODE_LIMIT: usize = 4_096;
+
 /// The variables that may be used at a place.
 pub(super) struct Scope {
     words: &'static str,
@@ -76,6 +79,10 @@ impl Check<'_> {
 
         let mut before = Scope::new("on the left side or among the parameters");
         before.extend(rule.bound_nodes());
+        let (limit, found) = (NODE_LIMIT, before.bound.len());
+        if found > limit {
+            self.report(&rule.name, Problem::TooLarge { limit, found });
+        }
         for expression in [Some(&rule.cost), rule.duration.as_ref()]
             .into_iter()
             .flatten()

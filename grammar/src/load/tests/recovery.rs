@@ -178,3 +178,20 @@ fn what_was_meant_is_no_longer_looked_for_where_nearly_every_name_is_unknown() {
         .collect();
     assert_eq!((help.len(), help[0], help[2_999]), (3_000, true, false));
 }
+
+#[test]
+fn a_rule_of_more_nodes_than_can_be_matched_is_an_error() {
+    let nodes = |count: usize| (0..count).map(|n| ["v", &n.to_string(), ":t "].concat());
+    let found = |left: usize, parameters: usize| {
+        let [left, parameters] = [left, parameters].map(|count| nodes(count).collect::<String>());
+        let parameters = parameters.replace('v', "p");
+        let text = format!(
+            "name=x\n===\nr : active(1) {{ {{ {left} }} => {{ {left} }} parameters {{ {parameters} }} }}\n"
+        );
+        let diagnostics = crate::parse_grammar(&text, "f.aggl").1;
+        crate::Defects { diagnostics }.to_string()
+    };
+    assert_eq!(found(4_000, 96), "");
+    let told = "f.aggl:3:1: error: a rule binds at most 4096 nodes, and this one 4097";
+    assert_eq!(found(4_000, 97), told);
+}
