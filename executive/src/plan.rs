@@ -65,6 +65,8 @@ pub struct Outcome {
     pub expanded: u64,
     /// Why there is no plan, or where it stopped.
     pub reason: Option<String>,
+    /// What was left out of planning, with the plan as without: where rules have a cost that is none.
+    pub notes: Vec<String>,
 }
 
 /// A rule at a binding that shall cost more than the rule says.
@@ -111,6 +113,7 @@ impl Outcome {
             steps: Vec::new(),
             expanded,
             reason: Some(reason),
+            notes: Vec::new(),
         }
     }
 }
@@ -340,6 +343,11 @@ fn solved(
             .collect(),
         expanded,
         reason: None,
+        notes: ground
+            .unpriced
+            .iter()
+            .map(|one| problem.unpriced(one))
+            .collect(),
     }
 }
 

@@ -157,7 +157,10 @@ fn told(outcome: &Outcome, seconds: f64) -> String {
     let mut text = String::new();
     let effort = format!("{} states expanded in {seconds:.3} s", outcome.expanded);
     let reason = outcome.reason.as_deref().unwrap_or_default();
-    // Writing to a string does not fail.
+    for note in &outcome.notes {
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "note: {note}");
+    }
     let _ = match outcome.status {
         Status::Unsolvable => writeln!(text, "unsolvable: {reason}\n{effort}"),
         Status::Limit => writeln!(text, "{reason}\n{effort}"),

@@ -46,9 +46,16 @@ impl<P: Planner> Executive<P> {
             )
         };
         let mut outcome = plan(Silent::LeftOut)?;
-        let asks_again = failures.may_ask_again(turn.now, &self.config);
-        if outcome.status != Status::Solved && asks_again && !(turn.interrupted)() {
-            outcome = plan(Silent::Asked)?;
+        let mut given_up = false;
+        let left_out = failures.leaves_out_agents(&self.config);
+        if outcome.status != Status::Solved && left_out && !(turn.interrupted)() {
+            let asking = plan(Silent::Asked)?;
+            let is_way = asking.status == Status::Solved;
+            if is_way && failures.may_ask_again(turn.now, &self.config) {
+                outcome = asking;
+            } else {
+                given_up = is_way;
+            }
         }
         if outcome.status == Status::Limit && (turn.interrupted)() {
             return Ok(Sought::NotNow);
@@ -60,7 +67,7 @@ impl<P: Planner> Executive<P> {
                 let mut words = vec![format!("no plan: {reason}")];
                 words.extend(failures.left_out(&self.config));
                 let words = words.join("; ");
-                if failures.leaves_out_agents(&self.config) {
+                if given_up {
                     Sought::Never(words)
                 } else {
                     Sought::Nothing(words)

@@ -17,8 +17,8 @@ pub(super) struct Failures<'a> {
     /// Steps that their agents did not take, one for each agent that has taken none since, and how many there
     /// were of this mission: none where other missions tell of the agent.
     unanswered: Vec<(&'a Step, usize)>,
-    /// When the first of those of this mission was given up.
-    silent_since: Option<Time>,
+    /// When the first and the last of those of this mission were given up.
+    silent: Option<(Time, Time)>,
 }
 
 /// What becomes of an agent that left as many steps unanswered as a step is tried.
@@ -37,7 +37,7 @@ impl<'a> Failures<'a> {
         let mut failures = Self {
             steps: Vec::new(),
             unanswered: Vec::new(),
-            silent_since: None,
+            silent: None,
         };
         let others = others.iter().map(|step| (step, 0));
         let mut all: Vec<(&Step, usize)> = others.chain(own.iter().map(|step| (step, 1))).collect();
@@ -60,7 +60,8 @@ impl<'a> Failures<'a> {
                         a.agent == b.agent
                     });
                     if counts > 0 {
-                        failures.silent_since = Some(step.since);
+                        let last = failures.silent.map_or(step.since, |(_, last)| last);
+                        failures.silent = Some((step.since, last));
                     }
                 }
                 _ => {}
@@ -98,10 +99,12 @@ impl<'a> Failures<'a> {
         steps.chain(agents).collect()
     }
 
-    /// Whether agents are left out that may be asked again, where there is no other way.
+    /// Whether agents that are left out may be asked again, where there is no other way: so long since the first
+    /// silence, and after a pause.
     pub(super) fn may_ask_again(&self, now: Time, config: &Config) -> bool {
-        let recent = |since: Time| now.since(since) < config.silence;
-        self.leaves_out_agents(config) && self.silent_since.is_some_and(recent)
+        self.silent.is_some_and(|(first, last)| {
+            now.since(first) < config.silence || now.since(last) > config.patience
+        })
     }
 
     /// Whether agents are left out.

@@ -232,6 +232,46 @@ fn an_agent_that_answers_after_long_is_at_work_again() {
 }
 
 #[test]
+fn a_silent_agent_is_asked_after_a_pause_and_silence_hides_no_other_want() {
+    let mut house = House::new(&[("go", GO_TO_WARD, 0)]);
+    house.agent = Agent::Silent;
+    house.run(130);
+    house.change(|transaction| transaction.set("go", "request", "pause"));
+    house.run(200);
+    house.change(|transaction| transaction.set("go", "request", "resume"));
+    house.agent = Agent::Works;
+    house.run(12);
+    assert!(
+        house.mission("go").starts_with("succeeded"),
+        "{}",
+        house.mission("go")
+    );
+
+    let mut shut = House::new(&[("go", GO_TO_WARD, 0)]);
+    shut.agent = Agent::Silent;
+    shut.run(130);
+    for room in ["kitchen", "garden"] {
+        shut.close(room, "ward");
+    }
+    shut.run(10);
+    let waits = shut.mission("go");
+    assert!(
+        waits.starts_with("running") && waits.contains("no plan"),
+        "{waits}"
+    );
+    for room in ["kitchen", "garden"] {
+        shut.change(|transaction| transaction.create_edge(room, "connected", "ward"));
+    }
+    shut.agent = Agent::Works;
+    shut.run(12);
+    assert!(
+        shut.mission("go").starts_with("succeeded"),
+        "{}",
+        shut.mission("go")
+    );
+}
+
+#[test]
 fn a_step_that_its_agent_failed_is_avoided() {
     let mut house = House::new(&[("greet", GREET_ANA, 0)]);
     house.run(2);

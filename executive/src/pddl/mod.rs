@@ -81,6 +81,7 @@ pub fn plan(definition: &Definition, effort: Effort, limits: &mut Limits<'_>) ->
                 .collect(),
             expanded: limits.expanded(),
             reason: None,
+            notes: left_out(&ground),
         },
         Answer::Unsolvable => {
             let reason = why_unsolvable(definition, &reached, &ground, limits.expanded());
@@ -154,15 +155,18 @@ fn why_unsolvable(
             "no action brings about what the goal asks for".to_owned()
         });
     }
-    if let Some(words) = &ground.without_cost {
-        reasons.push(words.clone());
-    }
-    match ground.left_out {
-        0 | 1 => {}
-        2 => reasons.push("so was another action".to_owned()),
-        more => reasons.push(format!("so were {} other actions", more - 1)),
-    }
+    reasons.extend(left_out(ground));
     reasons.join("; ")
+}
+
+/// What was left out for its cost, in words.
+fn left_out(ground: &Ground) -> Vec<String> {
+    let more = match ground.left_out {
+        0 | 1 => None,
+        2 => Some("so was another action".to_owned()),
+        more => Some(format!("so were {} other actions", more - 1)),
+    };
+    ground.without_cost.iter().cloned().chain(more).collect()
 }
 
 /// The atoms that the goal asks for outright and that no action may bring about.

@@ -128,6 +128,14 @@ fn a_cost_that_is_no_amount_is_told_with_its_place() {
             .reason
             .unwrap()
     };
+    let ward = "{ \"shelly\":robot \"ward\":room \"shelly\"->\"ward\"(in) }";
+    let solved = outcome(&grammar, &graph, ward, &Options::default());
+    assert_eq!((solved.status, solved.notes.len()), (Status::Solved, 2));
+    assert!(
+        solved.notes[0].contains("was left out"),
+        "{:?}",
+        solved.notes
+    );
     expect!["shelly -in-> attic cannot be reached; changeRoom(robot=shelly, room1=kitchen, room2=attic) was left out, since its cost (kitchen -connected-> attic).distance has no value; changeRoom(robot=shelly, room1=attic, room2=loft) was left out, since its cost (attic -connected-> loft).distance is -1, and costs are from 0 to 1000000000 (and at another binding)"].assert_eq(&why("attic"));
     expect!["shelly -in-> loft cannot be reached; changeRoom(robot=shelly, room1=kitchen, room2=attic) was left out, since its cost (kitchen -connected-> attic).distance has no value; changeRoom(robot=shelly, room1=attic, room2=loft) was left out, since its cost (attic -connected-> loft).distance is -1, and costs are from 0 to 1000000000 (and at another binding)"].assert_eq(&why("loft"));
 }
