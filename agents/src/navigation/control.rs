@@ -289,6 +289,10 @@ pub fn speed_near(gap: f64, top: f64) -> f64 {
 /// The speed at which the robot may brush past something, m/s.
 const CREEP: f64 = 0.1;
 
+/// So far a turning base carries its way round at the most, radians, and in so many steps it is looked along.
+const MOST_SWEPT: f64 = std::f64::consts::FRAC_PI_2;
+const SWEPT_WAYS: u32 = 6;
+
 /// How the laser alone limits the speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Guard {
@@ -354,12 +358,23 @@ impl Guard {
         (lag * lag + 2.0 * limits.acceleration * room).sqrt() - lag
     }
 
-    /// `wanted`, slowed to what [`Guard::allowed`] says.
+    /// `wanted`, slowed to what [`Guard::allowed`] says. An omnidirectional base that turns carries the way it
+    /// goes round with it: it may go as fast as lets it stand wherever in that sector it is by then.
     pub fn slowed(&self, wanted: Motion, scan: &LaserScan, limits: &Limits) -> Motion {
-        let way = Vector2::new(wanted.linear, wanted.lateral).try_normalize(1e-9);
-        way.map_or(wanted, |way| {
-            wanted.capped(self.allowed_along(scan, limits, way))
-        })
+        let Some(way) = Vector2::new(wanted.linear, wanted.lateral).try_normalize(1e-9) else {
+            return wanted;
+        };
+        let stands_in = self.delay + wanted.speed() / limits.acceleration;
+        let turn = match limits.base {
+            Base::Differential => 0.0,
+            Base::Omnidirectional => (wanted.angular * stands_in).clamp(-MOST_SWEPT, MOST_SWEPT),
+        };
+        let ways = if turn.abs() < 1e-3 { 0 } else { SWEPT_WAYS };
+        let allowed = (0..=ways)
+            .map(|part| turn * f64::from(part) / f64::from(SWEPT_WAYS))
+            .map(|angle| self.allowed_along(scan, limits, Rotation2::new(angle) * way))
+            .fold(f64::INFINITY, f64::min);
+        wanted.capped(allowed)
     }
 }
 

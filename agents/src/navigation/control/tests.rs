@@ -226,6 +226,33 @@ proptest! {
         }
     }
 
+    /// Nor while it turns, on a base that brakes no faster than it can.
+    #[test]
+    fn the_guard_stops_an_omnidirectional_robot_that_turns(
+        discs in proptest::collection::vec(((-3.0..3.0, -3.0..3.0), 0.05..0.5), 1..8),
+        heading in -PI..PI,
+        velocity in (-0.6..0.6, -0.6..0.6),
+        angular in -1.2..1.2,
+    ) {
+        let discs: Vec<_> = discs.into_iter()
+            .map(|((x, y), radius)| (Point2::new(x, y), radius))
+            .filter(|(centre, radius)| centre.coords.norm() > radius + 0.35)
+            .collect();
+        let (limits, guard) = (omnidirectional(), Guard::default());
+        let mut robot = at(0.0, 0.0, heading);
+        let wanted = Motion { linear: velocity.0, lateral: velocity.1, angular };
+        for _ in 0..120 {
+            let reached = limits.reachable(robot.motion, wanted, 0.05);
+            let command = guard.slowed(reached, &scan(&robot, &discs), &limits);
+            let motion = limits.reachable(robot.motion, command, 0.05);
+            robot = robot.advanced(motion, 0.05);
+            for (centre, radius) in &discs {
+                let gap = distance(centre, &robot.position) - radius - limits.radius;
+                prop_assert!(gap > -0.01, "{gap}");
+            }
+        }
+    }
+
     /// Whatever speed is asked for, a robot that obeys the guard never touches what it can see.
     #[test]
     fn the_guard_stops_the_robot_before_every_obstacle(

@@ -100,14 +100,17 @@ pub(super) const FIGURES: [Figure; 22] = [
         .map(|motion| motion.mean_jerk)),
 ];
 
-/// Mean and standard deviation of one figure; `None` where it applied to no drive.
-pub(super) type Summary = Option<(f64, f64)>;
+/// Mean and standard deviation of one figure, and of how many drives; `None` where it applied to none.
+pub(super) type Summary = Option<(f64, f64, usize)>;
 
 /// Of each figure, over those drives that it applies to.
 pub(super) fn summary(drives: &[Values]) -> Vec<Summary> {
     let of = |figure: usize| {
         let values: Vec<f64> = drives.iter().filter_map(|drive| drive[figure]).collect();
-        (!values.is_empty()).then(|| spread(&values))
+        (!values.is_empty()).then(|| {
+            let (mean, deviation) = spread(&values);
+            (mean, deviation, values.len())
+        })
     };
     (0..FIGURES.len()).map(of).collect()
 }
@@ -138,7 +141,7 @@ impl Comparison {
             });
             for (k, figure) in FIGURES.iter().enumerate() {
                 let cell = |way: &Vec<Summary>| match way[k] {
-                    Some((mean, deviation)) => Cell::number(mean).deviating(deviation),
+                    Some((mean, deviation, _)) => Cell::number(mean).deviating(deviation),
                     None => Cell::nothing(),
                 };
                 let comma = if figure.unit.is_empty() { "" } else { ", " };
@@ -162,7 +165,9 @@ impl Comparison {
     /// For machines.
     pub(in super::super) fn json(&self, about: &str) -> Value {
         let value = |summary: &Summary| match summary {
-            Some((mean, deviation)) => json!({"mean": mean, "deviation": deviation}),
+            Some((mean, deviation, drives)) => {
+                json!({"mean": mean, "deviation": deviation, "drives": drives})
+            }
             None => Value::Null,
         };
         let worlds = self.worlds.iter().map(|world| {
@@ -206,8 +211,8 @@ mod tests {
         let second = vec![Some(3.0); FIGURES.len()];
         first[15] = None;
         let summary = summary(&[first, second]);
-        assert_eq!(summary[0].map(|(mean, _)| mean), Some(2.0));
-        assert_eq!(summary[15], Some((3.0, 0.0)));
+        assert_eq!(summary[0].map(|(mean, ..)| mean), Some(2.0));
+        assert_eq!(summary[15], Some((3.0, 0.0, 1)));
     }
 
     #[test]
@@ -219,7 +224,7 @@ mod tests {
                 name: "there",
                 about: "somewhere",
                 ways: vec![
-                    vec![Some((1.25, 0.5)); FIGURES.len()],
+                    vec![Some((1.25, 0.5, 2)); FIGURES.len()],
                     vec![None; FIGURES.len()],
                 ],
             }],
