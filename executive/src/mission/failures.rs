@@ -1,6 +1,6 @@
 //! What went wrong lately with the steps of a mission: those that failed, and agents that did not take
-//! what they were given. This file guarantees that an agent is waited for as often as a step is tried,
-//! however many steps there are that it could be given.
+//! what they were given. This file guarantees that an agent is waited for no more often than a step is
+//! tried where there is another way, however many steps there are that it could be given.
 
 use super::Config;
 use super::record::{Step, StepStatus};
