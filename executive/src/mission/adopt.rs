@@ -30,8 +30,7 @@ impl<P: Planner> Executive<P> {
             return Ok(Sought::NotNow);
         }
         let recent = outcomes::recent(turn.snapshot)?;
-        let others = others(recent.clone(), mission);
-        let failures = Failures::of(&mission.steps, &others, turn.now, &self.config);
+        let failures = Failures::of(&mission.steps, &recent, turn.now, &self.config);
         let grammar = outcomes::learned(&self.grammar, &recent);
         let plan = |silent: Silent| {
             let mut options = self.config.options.clone();
@@ -156,12 +155,6 @@ impl<P: Planner> Executive<P> {
         self.search.sound = None;
         self.search.traced = None;
     }
-}
-
-/// Those steps that are of other missions.
-fn others(mut recent: Vec<Step>, mission: &Mission) -> Vec<Step> {
-    recent.retain(|step| !mission.steps.iter().any(|own| own.name == step.name));
-    recent
 }
 
 /// The steps of a plan, for the graph.

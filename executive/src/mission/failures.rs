@@ -31,15 +31,18 @@ pub(super) enum Silent {
 }
 
 impl<'a> Failures<'a> {
-    /// What went wrong with the steps of a mission, oldest first, and what those of `others` tell of agents,
+    /// What went wrong with the steps of a mission, and what the `recent` ones of all missions tell of agents,
     /// within the executive's memory.
-    pub(super) fn of(own: &'a [Step], others: &'a [Step], now: Time, config: &Config) -> Self {
+    pub(super) fn of(own: &'a [Step], recent: &'a [Step], now: Time, config: &Config) -> Self {
         let mut failures = Self {
             steps: Vec::new(),
             unanswered: Vec::new(),
             silent: None,
         };
-        let others = others.iter().map(|step| (step, 0));
+        let others = recent
+            .iter()
+            .filter(|step| !own.iter().any(|own| own.name == step.name));
+        let others = others.map(|step| (step, 0));
         let mut all: Vec<(&Step, usize)> = others.chain(own.iter().map(|step| (step, 1))).collect();
         all.retain(|(step, _)| now.since(step.since) <= config.memory);
         all.sort_by_key(|(step, _)| step.since);
@@ -72,16 +75,17 @@ impl<'a> Failures<'a> {
 
     /// What shall cost more in the next plan, or be left out.
     pub(super) fn raised(&self, grammar: &Grammar, config: &Config, silent: Silent) -> Vec<Raised> {
-        let dearer = |times: usize| config.penalty * times.max(1) as f64;
-        let often = |times: usize| times >= config.tries;
+        let by = |times: usize, may_be_left_out: bool| {
+            if may_be_left_out && times >= config.tries {
+                f64::INFINITY
+            } else {
+                config.penalty * times.max(1) as f64
+            }
+        };
         let steps = self.steps.iter().map(|&(step, times)| Raised {
             rule: step.rule.clone(),
             binding: step.binding.clone(),
-            by: if often(times) {
-                f64::INFINITY
-            } else {
-                dearer(times)
-            },
+            by: by(times, true),
         });
         let agents = self.unanswered.iter().flat_map(|&(step, times)| {
             let rules = grammar.rules.iter();
@@ -89,11 +93,7 @@ impl<'a> Failures<'a> {
             rules.map(move |rule| Raised {
                 rule: rule.name.to_string(),
                 binding: BTreeMap::new(),
-                by: if often(times) && silent == Silent::LeftOut {
-                    f64::INFINITY
-                } else {
-                    dearer(times)
-                },
+                by: by(times, silent == Silent::LeftOut),
             })
         });
         steps.chain(agents).collect()
@@ -109,27 +109,29 @@ impl<'a> Failures<'a> {
 
     /// Whether agents are left out.
     pub(super) fn leaves_out_agents(&self, config: &Config) -> bool {
-        self.unanswered
-            .iter()
-            .any(|(_, times)| *times >= config.tries)
+        too_often(&self.unanswered, config).next().is_some()
     }
 
     /// What is left out of the next plan, in words.
     pub(super) fn left_out<'s>(&'s self, config: &Config) -> impl Iterator<Item = String> + 's {
-        let tries = config.tries;
-        let often = move |times: usize| times >= tries;
-        let steps = self.steps.iter().filter(move |(_, times)| often(*times));
+        let steps = too_often(&self.steps, config);
         let steps =
             steps.map(|(step, times)| format!("{step} failed {times} times: {}", step.reason));
-        let agents = self
-            .unanswered
-            .iter()
-            .filter(move |(_, times)| often(*times));
+        let agents = too_often(&self.unanswered, config);
         steps.chain(agents.map(|(step, times)| {
             let agent = &step.agent;
             format!("agent {agent} did not take {times} steps, the last of them {step}")
         }))
     }
+}
+
+/// Those that went wrong as often as a step is tried.
+fn too_often<'s>(
+    known: &'s [(&'s Step, usize)],
+    config: &Config,
+) -> impl Iterator<Item = &'s (&'s Step, usize)> + use<'s> {
+    let tries = config.tries;
+    known.iter().filter(move |(_, times)| *times >= tries)
 }
 
 /// Counts a step with the one of its kind.
