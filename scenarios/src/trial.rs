@@ -254,21 +254,29 @@ mod tests {
     use super::*;
     use nalgebra::{Point2, Vector2};
 
+    /// A drive of ours to a point, with social behaviour.
+    fn to(scenario: &Scenario, x: f64, y: f64) -> Trial<'_> {
+        Trial {
+            scenario,
+            seed: 1,
+            tracks: None,
+            unmapped: &[],
+            method: Method::Navigation,
+            social: true,
+            targets: vec![Target::Point(Point2::new(x, y))],
+            navigation: Config::default(),
+            agenda_from: 0.0,
+        }
+    }
+
     #[test]
     fn a_trial_gets_there_and_is_the_same_to_the_bit() {
         let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("care-centre");
         let mut scenario = Scenario::load(&folder).unwrap();
         scenario.duration = 40.0;
         let trial = Trial {
-            scenario: &scenario,
             seed: 3,
-            tracks: None,
-            unmapped: &[],
-            method: Method::Navigation,
-            social: true,
-            targets: vec![Target::Point(Point2::new(4.0, 6.0))],
-            navigation: Config::default(),
-            agenda_from: 0.0,
+            ..to(&scenario, 4.0, 6.0)
         };
         let drive = trial.drive().unwrap();
         assert!(drive.arrived);
@@ -282,17 +290,7 @@ mod tests {
         let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("corridor");
         let mut scenario = Scenario::load(&folder).unwrap();
         scenario.robot.base = crate::scenario::Base::Omnidirectional;
-        let trial = Trial {
-            scenario: &scenario,
-            seed: 1,
-            tracks: None,
-            unmapped: &[],
-            method: Method::Navigation,
-            social: true,
-            targets: vec![Target::Point(Point2::new(13.2, 1.5))],
-            navigation: Config::default(),
-            agenda_from: 0.0,
-        };
+        let trial = to(&scenario, 13.2, 1.5);
         let drive = trial.drive().unwrap();
         assert!(drive.arrived);
         let samples = &drive.samples;
@@ -308,15 +306,9 @@ mod tests {
         let scenario = Scenario::load(&folder).unwrap();
         for method in [Method::AStar, Method::SocialForce] {
             let trial = Trial {
-                scenario: &scenario,
-                seed: 1,
-                tracks: None,
-                unmapped: &[],
                 method,
                 social: false,
-                targets: vec![Target::Point(Point2::new(13.2, 1.5))],
-                navigation: Config::default(),
-                agenda_from: 0.0,
+                ..to(&scenario, 13.2, 1.5)
             };
             let drive = trial.drive().unwrap();
             assert!(drive.arrived, "{method:?}");
@@ -334,15 +326,10 @@ mod tests {
         let text = (0..40).map(line).collect::<Vec<_>>().concat();
         let tracks = Tracks::parse("recorded", &text).unwrap();
         let trial = Trial {
-            scenario: &scenario,
-            seed: 1,
             tracks: Some(&tracks),
-            unmapped: &[],
             method: Method::AStar,
             social: false,
-            targets: vec![Target::Point(Point2::new(13.0, 8.0))],
-            navigation: Config::default(),
-            agenda_from: 0.0,
+            ..to(&scenario, 13.0, 8.0)
         };
         let drive = trial.drive().unwrap();
         let all = drive.samples.iter().flat_map(|sample| &sample.people);
