@@ -8,7 +8,7 @@ use crate::commands::{read_grammar, read_text};
 use crate::{Answer, Failure};
 use dsr::{Session, Snapshot, Time, Transaction};
 use executive::{MissionSpec, Preemption, Schedule};
-use grammar::{Defects, Diagnostic, SourceFile};
+use grammar::{Defects, Diagnostic, Goal, SourceFile, Types};
 use scenarios::scenario::{Earlier, Mission, MissionFile, Present};
 use serde_json::json;
 use std::path::Path;
@@ -200,14 +200,42 @@ pub(crate) fn check_goal(goal: &str, file: &str, snapshot: &Snapshot) -> Result<
 /// All that is wrong with a goal.
 fn goal_defects(goal: &str, file: &str, snapshot: &Snapshot) -> Vec<Diagnostic> {
     let grammar = grammar::Grammar {
-        types: grammar::Types::of_schema(snapshot.schema()),
+        types: Types::of_schema(snapshot.schema()),
         ..grammar::Grammar::default()
     };
+    let fits = |parsed: &Goal| {
+        let source = SourceFile::new(file, goal);
+        grammar.check_goal_schema(parsed, &source, snapshot.schema())
+    };
     match grammar::parse_goal(goal, file, &grammar.types) {
-        Ok(parsed) => {
-            let source = SourceFile::new(file, goal);
-            grammar.check_goal_schema(&parsed, &source, snapshot.schema())
+        Ok(parsed) => fits(&parsed),
+        Err(mut defects) => {
+            // Types that are unknown hide no label that is: of what does not fit, the rest is told, too.
+            if let Ok(parsed) = grammar::parse_goal(goal, file, &Types::default()) {
+                let told: Vec<_> = defects.diagnostics.iter().map(|one| one.span).collect();
+                let more = fits(&parsed).into_iter();
+                let more = more.filter(|defect| !told.contains(&defect.span));
+                defects.diagnostics.extend(more);
+            }
+            defects.diagnostics
         }
-        Err(defects) => defects.diagnostics,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unknown_type_hides_no_unknown_label() {
+        let graph = dsr::Graph::in_memory(scenarios::schema().unwrap());
+        let goal = "{ \"robot\":robt p:person p->\"robot\"(frnt) }";
+        let told = goal_defects(goal, "call.aggt", &graph.snapshot());
+        let told: Vec<String> = told.iter().map(ToString::to_string).collect();
+        assert_eq!(told.len(), 2, "{told:?}");
+        assert!(
+            told[0].contains("robt") && told[1].contains("frnt"),
+            "{told:?}"
+        );
     }
 }
