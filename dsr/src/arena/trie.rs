@@ -22,7 +22,7 @@ const WIDTH: u64 = 1 << BITS;
 /// The bitmap of a block that has all its links.
 const FULL: u64 = (1 << WIDTH) - 1;
 /// No id has more groups of so many bits than this.
-const LEVELS: u64 = 64u64.div_ceil(BITS);
+pub(crate) const LEVELS: u64 = 64u64.div_ceil(BITS);
 /// Blocks and the record on the way to a node.
 const STEPS: u64 = LEVELS + 1;
 /// Bitmap and prefix.
@@ -242,6 +242,56 @@ pub(crate) fn remove(writer: &mut Writer, link: Link, id: u64) -> Result<Link, F
     }
     let address = writer.replace(address, old, block.words())?;
     Ok(to_block(address, level))
+}
+
+/// Gives `found` the ids under two links whose records may differ: those on all ways that the two do not
+/// share. `Err` where one leads to an impossible place.
+pub(crate) fn differences(
+    arena: &Arena,
+    [a, b]: [Link; 2],
+    above: u64,
+    found: &mut Vec<u64>,
+) -> Result<(), Address> {
+    if a == b {
+        return Ok(());
+    }
+    let level = level_of(a);
+    if let (Some(one), Some(other)) = (block(arena, a)?, block(arena, b)?)
+        && level == level_of(b)
+        && level < above
+        && one[1].load() == other[1].load()
+    {
+        let link = |words: &[Word], bit: u64| {
+            let bitmap = words[0].load();
+            match bitmap & (1 << bit) {
+                0 => 0,
+                _ => words.get(HEADER + rank(bitmap, bit)).map_or(0, Word::load),
+            }
+        };
+        let either = one[0].load() | other[0].load();
+        for bit in (0..WIDTH).filter(|bit| either & (1 << bit) != 0) {
+            differences(arena, [link(one, bit), link(other, bit)], level, found)?;
+        }
+        return Ok(());
+    }
+    for link in [a, b] {
+        let mut walk = Walk::new(link);
+        while let Some((_, words)) = walk.next(arena)? {
+            found.extend(words.first().map(Word::load));
+        }
+    }
+    Ok(())
+}
+
+/// The words of the block that a link leads to, two at the least; `None` where it leads to a record or
+/// nowhere.
+fn block(arena: &Arena, link: Link) -> Result<Option<&[Word]>, Address> {
+    if link == 0 || is_record(link) {
+        return Ok(None);
+    }
+    let address = address_of(link);
+    let words = arena.from(address).filter(|words| words.len() >= HEADER);
+    words.map(Some).ok_or(address)
 }
 
 /// Walks the records by ascending id.

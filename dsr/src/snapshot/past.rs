@@ -1,8 +1,9 @@
 //! Earlier versions, as far back as the store keeps them, and who made each with which rules.
 
 use super::Snapshot;
-use crate::arena::{ReadError, record};
-use crate::{RuleApplication, Version, WriterId};
+use crate::arena::{Address, ReadError, late, record, trie};
+use crate::{NodeId, RuleApplication, Version, WriterId};
+use std::collections::BTreeSet;
 
 impl Snapshot {
     /// The graph as of an earlier version, or of this one.
@@ -19,6 +20,37 @@ impl Snapshot {
     /// The oldest version that [`Self::at`] still gives.
     pub fn oldest(&self) -> Version {
         Version(self.arena.oldest_root(self.root.version))
+    }
+
+    /// The nodes that differ from an earlier version of the same store's graph, by id: made or deleted since, or
+    /// with other attributes or edges, or with another attribute of an edge that starts there. It takes as long as
+    /// there are such nodes, however many others there are.
+    ///
+    /// # Errors
+    /// [`ReadError`], of either version.
+    pub fn changed_since(&self, before: &Self) -> Result<Vec<NodeId>, ReadError> {
+        let found = self.may_differ(before);
+        before.check()?;
+        self.genuine(found)
+    }
+
+    fn may_differ(&self, before: &Self) -> Result<Vec<NodeId>, Address> {
+        let (arena, roots) = (&self.arena, [&before.root, &self.root]);
+        let mut found = Vec::new();
+        let links = roots.map(|root| root.nodes);
+        trie::differences(arena, links, trie::LEVELS, &mut found)?;
+        let mut ids = BTreeSet::from_iter(found);
+        for root in roots {
+            ids.extend(late::node(arena, root)?.map(|(id, _)| id));
+        }
+        let mut differing = Vec::new();
+        for id in ids {
+            let [old, new] = roots.map(|root| late::find(arena, root, id));
+            if old? != new? {
+                differing.push(NodeId(id));
+            }
+        }
+        Ok(differing)
     }
 
     /// The agent that made this version; `None` for the first of a store.
@@ -80,6 +112,50 @@ mod tests {
     fn n(snapshot: &Snapshot) -> Option<Value> {
         let node = snapshot.find_node_by_name("a").unwrap().unwrap();
         node.value("n").unwrap()
+    }
+
+    #[test]
+    fn what_differs_between_two_versions_is_found_without_the_rest() {
+        let mut graph = Graph::in_memory(Schema::open());
+        let mut transaction = Transaction::new();
+        for index in 0..300 {
+            transaction.create_node("thing", &format!("n{index}"), vec![]);
+        }
+        transaction.create_edge("n7", "near", "n8");
+        let mut commit = |transaction: &Transaction| {
+            graph.commit(transaction, "one", Time::default()).unwrap();
+            graph.snapshot()
+        };
+        let first = commit(&transaction);
+        let mut one = Transaction::new();
+        one.set("n40", "n", 1.0);
+        let second = commit(&one);
+        let mut several = Transaction::new();
+        several.delete_node("n41");
+        several.create_node("thing", "new", vec![]);
+        several.set_on_edge(crate::EdgeRef::new("n7", "near", "n8"), "n", 2.0);
+        let third = commit(&several);
+        let mut again = Transaction::new();
+        again.set("n40", "n", 3.0);
+        let fourth = commit(&again);
+        let changed = |later: &Snapshot, earlier: &Snapshot| -> Vec<String> {
+            let name = |id| match later.find_node(id).unwrap() {
+                Some(node) => node.name().unwrap(),
+                None => format!(
+                    "without {}",
+                    earlier.find_node(id).unwrap().unwrap().name().unwrap()
+                ),
+            };
+            let found = later.changed_since(earlier).unwrap();
+            found.into_iter().map(name).collect()
+        };
+        assert_eq!(changed(&second, &first), ["n40"]);
+        assert_eq!(changed(&third, &second), ["n7", "without n41", "new"]);
+        assert_eq!(
+            changed(&fourth, &first),
+            ["n7", "n40", "without n41", "new"]
+        );
+        assert!(changed(&fourth, &fourth).is_empty());
     }
 
     #[test]
