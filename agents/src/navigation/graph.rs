@@ -6,7 +6,8 @@ mod people;
 mod read;
 
 pub use self::read::{
-    AGENT, BASE, MAP_HOLD_AFTER, MAP_SLOW_AFTER, MAP_STATE, StepError, TALKING_DISTANCE,
+    AGENT, BASE, BUBBLES, MAP_HOLD_AFTER, MAP_SLOW_AFTER, MAP_STATE, PLANNED_PATH, StepError,
+    TALKING_DISTANCE,
 };
 
 use self::read::{Step, Work, World};
@@ -298,28 +299,31 @@ impl Navigation {
                 transaction.set(robot.id, "velocity", Value::Vector(moving));
             }
         }
-        if robot.map_state.as_deref() != Some(world.map.name())
-            && snapshot.schema().find_attribute(MAP_STATE).is_some()
-        {
+        let knows = |name| snapshot.schema().find_attribute(name).is_some();
+        if robot.map_state.as_deref() != Some(world.map.name()) && knows(MAP_STATE) {
             transaction.set(robot.id, MAP_STATE, world.map.name());
         }
-        let path: Vec<f64> = self
-            .navigator
-            .path()
-            .iter()
-            .flat_map(|p| [p.x, p.y])
-            .collect();
+        let path = coordinates(self.navigator.path());
+        let planned = coordinates(self.navigator.planned());
         let bent = path.len() != robot.path.len()
             || path
                 .iter()
                 .zip(&robot.path)
-                .any(|(new, told)| (new - told).abs() > BENT.0);
+                .any(|(new, told)| (new - told).abs() > BENT.0)
+            || knows(PLANNED_PATH) && planned != robot.planned;
         let due = self
             .path_written
             .is_none_or(|written| now.since(written) >= BENT.1);
         if bent && (due || path.is_empty()) {
             self.path_written = Some(now);
             transaction.set(robot.id, "path", Value::F64List(path));
+            if knows(BUBBLES) {
+                let bubbles = self.navigator.bubbles().to_vec();
+                transaction.set(robot.id, BUBBLES, Value::F64List(bubbles));
+            }
+            if knows(PLANNED_PATH) && planned != robot.planned {
+                transaction.set(robot.id, PLANNED_PATH, Value::F64List(planned));
+            }
         }
         Ok((!transaction.is_empty()).then_some(transaction))
     }
@@ -364,6 +368,10 @@ impl Navigation {
         transaction.create_edge(world.robot.id, "in", room.id);
         Some(transaction)
     }
+}
+
+fn coordinates(line: &[Point2<f64>]) -> Vec<f64> {
+    line.iter().flat_map(|point| [point.x, point.y]).collect()
 }
 
 fn inputs<'a>(messages: &Messages<'a>, world: &'a World, task: Option<&'a Task>) -> Inputs<'a> {

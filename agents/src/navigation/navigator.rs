@@ -198,6 +198,19 @@ impl Navigator {
         self.band.points()
     }
 
+    /// The radius of the band's bubble about each point of it, metres.
+    pub fn bubbles(&self) -> &[f64] {
+        self.band.radii()
+    }
+
+    /// The path that the band was laid along, world frame; empty where the robot is not under way.
+    pub fn planned(&self) -> &[Point2<f64>] {
+        match &self.course {
+            Some(course) if !self.band.points().is_empty() => &course.line,
+            _ => &[],
+        }
+    }
+
     /// How often a path has been planned and taken.
     pub fn plans(&self) -> u64 {
         self.plans

@@ -19,6 +19,10 @@ pub const MAP_STATE: &str = "map_state";
 /// The robot's attributes that say from which age of the grid on it drives slower, and stands, seconds. They may be set
 /// while running; where they are absent, [`MapPatience`] has the usual figures.
 pub const MAP_SLOW_AFTER: &str = "map_slow_after";
+/// The robot's attribute with the radius of the band's bubble about each point of `path`, metres.
+pub const BUBBLES: &str = "bubbles";
+/// The robot's attribute with the path that the band was laid along.
+pub const PLANNED_PATH: &str = "planned_path";
 /// The robot's attribute that says which ways its base goes: the name of a [`Base`].
 pub const BASE: &str = "base";
 /// See [`MAP_SLOW_AFTER`].
@@ -53,8 +57,9 @@ pub(super) struct Robot {
     pub(super) limits: Limits,
     /// What `velocity` says now.
     pub(super) velocity: Vec<f64>,
-    /// What `path` says now.
+    /// What `path` and `planned_path` say now.
     pub(super) path: Vec<f64>,
+    pub(super) planned: Vec<f64>,
     pub(super) room: Option<NodeId>,
     /// What `map_state` says now.
     pub(super) map_state: Option<String>,
@@ -227,6 +232,7 @@ fn robot(snapshot: &Snapshot, node: &Node) -> Result<Robot, ReadError> {
         },
         velocity: numbers(node, "velocity")?,
         path: numbers(node, "path")?,
+        planned: numbers(node, PLANNED_PATH)?,
         room,
         map_state: text(node, MAP_STATE)?,
     })

@@ -275,6 +275,33 @@ fn change_room_drives_through_the_door_and_applies_the_rule() {
 }
 
 #[test]
+fn the_band_has_a_bubble_at_each_point_and_lies_along_the_planned_path() {
+    let mut home = Home::new();
+    home.dispatch("changeRoom", CHANGE_ROOM);
+    home.run(4.0);
+    let list = |name: &str| -> Vec<f64> {
+        let snapshot = home.graph.snapshot();
+        let shelly = snapshot.find_node_by_name("shelly").unwrap().unwrap();
+        let value = shelly.value(name).unwrap().unwrap();
+        value.as_f64s().unwrap().to_vec()
+    };
+    let [path, bubbles, planned] = ["path", BUBBLES, PLANNED_PATH].map(list);
+    assert!(path.len() > 4 && bubbles.len() == path.len() / 2);
+    assert!(bubbles.iter().all(|radius| *radius > 0.0), "{bubbles:?}");
+    // Both end where the robot is to be.
+    assert_eq!(planned[planned.len() - 2..], path[path.len() - 2..]);
+    assert!(planned[0] < path[0], "the robot has gone a part of the way");
+    home.run(21.0);
+    assert_eq!(home.status(), "done");
+    let snapshot = home.graph.snapshot();
+    let shelly = snapshot.find_node_by_name("shelly").unwrap().unwrap();
+    for name in [BUBBLES, PLANNED_PATH] {
+        let value = shelly.value(name).unwrap().unwrap();
+        assert_eq!(value, Value::F64List(Vec::new()), "{name}");
+    }
+}
+
+#[test]
 fn a_navigation_started_anew_resumes_the_running_step_from_the_graph() {
     let mut home = Home::new();
     home.dispatch("changeRoom", CHANGE_ROOM);

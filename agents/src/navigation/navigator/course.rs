@@ -12,6 +12,8 @@ pub(super) struct Course {
     pub(super) task: Task,
     pub(super) region: Option<Region>,
     pub(super) ended: Option<Status>,
+    /// The path that the band was laid along.
+    pub(super) line: Vec<Point2<f64>>,
     /// Where the band leads.
     pub(super) destination: Option<Destination>,
     /// Where the person stood for whom the destination was chosen.
@@ -78,6 +80,7 @@ impl Course {
             task: task.clone(),
             region,
             ended: None,
+            line: Vec::new(),
             destination: None,
             person: Point2::origin(),
             planned: None,

@@ -110,6 +110,7 @@ impl Navigator {
         let (destination, line) = found?;
         course.hindered = None;
         let line_end = line[line.len() - 1];
+        course.line.clone_from(&line);
         course.destination = Some(Destination {
             point: line_end,
             ..destination
