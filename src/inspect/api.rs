@@ -2,13 +2,15 @@
 //! JSON and that what cannot be answered says why.
 
 use super::look::{Looker, Source};
+use super::news;
 use crate::Failure;
 use crate::commands::{graph, why};
 use crate::view::map::Map;
-use crate::view::{graph as nodes, grid, mission};
+use crate::view::{agenda, graph as nodes, grid, mission};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use dsr::{NodeId, Snapshot, Version};
+use dsr::{NodeId, Snapshot};
+use grammar::live::Published;
 use serde::Deserialize;
 use serde_json::{Value as Json, json};
 use std::time::Duration;
@@ -18,7 +20,7 @@ const PATIENCE: Duration = Duration::from_millis(200);
 /// So many entries of a history.
 const HISTORY: usize = 100;
 /// So many commits before a time.
-const COMMITS: u64 = 80;
+const COMMITS: usize = 80;
 
 /// What a question says beside its name.
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -27,6 +29,11 @@ pub(super) struct Question {
     pub(super) at: Option<f64>,
     pub(super) id: Option<u64>,
     pub(super) path: Option<String>,
+    /// Of commits: only those that applied rules,
+    #[serde(default)]
+    pub(super) rules: bool,
+    /// only those of an agent.
+    pub(super) agent: Option<String>,
 }
 
 /// Answers a question; `None` where nobody knows such a one.
@@ -36,6 +43,10 @@ pub(super) fn answer(
     question: &Question,
 ) -> Option<Result<Json, Failure>> {
     let path = question.path.as_deref();
+    let sieve = news::Sieve {
+        rules: question.rules,
+        agent: question.agent.as_deref(),
+    };
     Some(match what {
         "about" => about(looker),
         "graph" => whole(looker, question.at),
@@ -50,8 +61,11 @@ pub(super) fn answer(
         "why" => looker
             .at(question.at)
             .and_then(|snapshot| why::explain(&snapshot, path.filter(|path| !path.is_empty()))),
-        "commits" => looker.at(question.at).map(|snapshot| commits(&snapshot)),
-        "agenda" => of(looker, question.at, agenda),
+        "commits" => looker
+            .at(question.at)
+            .map(|snapshot| json!(news::commits(&snapshot, &sieve, COMMITS))),
+        "agenda" => of(looker, question.at, agenda::agenda),
+        "rules" => of(looker, question.at, rules),
         "grid" => social_grid(looker),
         _ => return None,
     })
@@ -99,38 +113,22 @@ fn node(looker: &mut Looker, question: &Question) -> Result<Json, Failure> {
     found.ok_or_else(|| Failure::input(format!("there is no node {id} then")))
 }
 
-/// The last commits up to a snapshot, newest first: by whom and by which rules, as far as they are kept.
-fn commits(snapshot: &Snapshot) -> Json {
-    let version = snapshot.version().0;
-    let versions = (version.saturating_sub(COMMITS)..=version).rev();
-    let row = |version| {
-        let cause = executive::Cause::find(snapshot, Version(version))
-            .ok()
-            .flatten()?;
-        Some(json!({
-            "version": version, "time": cause.time, "agent": cause.agent, "rules": cause.rules,
-        }))
+/// The rules that can be applied, each with the variables that it binds and their types.
+fn rules(snapshot: &Snapshot) -> Result<Json, dsr::ReadError> {
+    // The store lets in no other rules than those that can be read.
+    let grammar = Published::find(snapshot)?.and_then(|text| text.read(snapshot.schema()).ok());
+    let row = |rule: &grammar::Rule| {
+        let bound = rule.bound_nodes();
+        let bound = bound.map(|node| [node.variable.to_string(), node.type_name.to_string()]);
+        json!({
+            "name": rule.name.to_string(), "variables": bound.collect::<Vec<_>>(),
+            "says": rule.comments.join(" "),
+        })
     };
-    versions.filter_map(row).collect()
-}
-
-/// What is to take place when, at which object, by start.
-fn agenda(snapshot: &Snapshot) -> Result<Json, dsr::ReadError> {
-    let mut rows = Vec::new();
-    for activity in snapshot.nodes_of("activity") {
-        let activity = activity?;
-        let value = |name: &str| activity.value(name);
-        let number = |name: &str| Ok::<_, dsr::ReadError>(value(name)?.and_then(|v| v.as_f64()));
-        let text = value("object")?;
-        rows.push(json!({
-            "name": activity.name()?, "start": number("start")?, "end": number("end")?,
-            "object": text.as_ref().and_then(dsr::Value::as_str),
-            "cancelled": value("cancelled")?.and_then(|v| v.as_bool()).unwrap_or(false),
-        }));
-    }
-    let start = |row: &Json| row["start"].as_f64().unwrap_or(0.0);
-    rows.sort_by(|a, b| start(a).total_cmp(&start(b)));
-    Ok(Json::Array(rows))
+    Ok(grammar
+        .iter()
+        .flat_map(|grammar| grammar.all_rules().map(row))
+        .collect())
 }
 
 /// The newest grid of costs as a byte a cell: 0 costs what free space costs, 255 is blocked.

@@ -3,8 +3,10 @@
 
 use super::look::{Looker, Source};
 use crate::Failure;
+use crate::commands::output::clock;
 use crate::commands::{graph, mission};
-use dsr::{CommitError, NodeRef, Snapshot, Transaction};
+use agents::social_mapping::object_space::Agenda;
+use dsr::{CommitError, NodeRef, Snapshot, Time, Transaction};
 use executive::{MissionSpec, Preemption, Request, Schedule};
 use serde::Deserialize;
 use serde_json::{Value as Json, json};
@@ -27,6 +29,13 @@ pub(super) enum Edit {
         goal: String,
         #[serde(default)]
         priority: i64,
+    },
+    /// Changes when an activity takes place, in seconds since 1970, and whether it does.
+    Activity {
+        name: String,
+        start: f64,
+        end: f64,
+        cancelled: bool,
     },
     /// Asks something of a mission: pause, resume or cancel.
     Request { mission: String, request: String },
@@ -71,6 +80,25 @@ fn transaction(snapshot: &Snapshot, edit: &Edit) -> Result<Transaction, Failure>
             };
             transaction.create_node("mission", name, spec.attributes());
         }
+        Edit::Activity {
+            name,
+            start,
+            end,
+            cancelled,
+        } => {
+            let [from, to] = [*start, *end].map(Time::from_seconds);
+            if Agenda::new(from, to).is_err() {
+                let [from, to] = [from, to].map(clock);
+                return Err(Failure::input_with_help(
+                    format!("{name} would begin at {from} and end at {to}"),
+                    "let it end after it begins",
+                ));
+            }
+            for (attribute, value) in [("start", *start), ("end", *end)] {
+                transaction.set(name.as_str(), attribute, value);
+            }
+            transaction.set(name.as_str(), "cancelled", *cancelled);
+        }
         Edit::Request { mission, request } => {
             let request = Request::find(request)
                 .ok_or_else(|| Failure::input("ask to pause, resume or cancel"))?;
@@ -83,7 +111,7 @@ fn transaction(snapshot: &Snapshot, edit: &Edit) -> Result<Transaction, Failure>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dsr::{Graph, Time};
+    use dsr::Graph;
 
     fn of(json: Json) -> Result<Transaction, Failure> {
         let mut graph = Graph::in_memory(scenarios::schema().unwrap());
@@ -102,6 +130,13 @@ mod tests {
         let mission = |goal: &str| of(json!({"kind": "mission", "name": "m", "goal": goal}));
         assert!(mission("no goal at all").is_err());
         assert!(of(json!({"kind": "request", "mission": "m", "request": "explode"})).is_err());
+        let activity = |end: f64| {
+            of(
+                json!({"kind": "activity", "name": "news", "start": 60.0, "end": end, "cancelled": true}),
+            )
+        };
+        assert_eq!(activity(90.0).unwrap().operations.len(), 3);
+        assert!(activity(50.0).is_err());
         let request = of(json!({"kind": "request", "mission": "m", "request": "cancel"}));
         assert_eq!(request.unwrap().operations.len(), 1);
     }

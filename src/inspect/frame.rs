@@ -2,26 +2,22 @@
 //! frame holds only what changed since the one before, and that who comes in between can ask for the
 //! rest.
 
+use super::laser::Laser;
 use super::look::{Looker, Source};
+use super::news::Follower;
 use super::processes::Processes;
 use crate::Failure;
-use crate::commands::graph::name_of;
 use crate::view::map::Map;
 use crate::view::mission::missions;
-use dsr::{Change, Changes, Filter, Snapshot, Touch, Update};
 use serde_json::{Value as Json, json};
-use std::collections::BTreeSet;
 
-/// The last commits that a frame tells one by one.
-const TOLD: usize = 40;
-/// The nodes that a commit's line names.
-const NAMED: usize = 4;
 /// Frames between two looks at the processes.
 const PROCESSES_EVERY: u64 = 10;
 
 /// Puts frames together.
 pub(super) struct Frames {
-    changes: Changes,
+    follower: Follower,
+    laser: Laser,
     map: Option<Map>,
     missions: Option<Json>,
     processes: Processes,
@@ -29,14 +25,14 @@ pub(super) struct Frames {
 }
 
 impl Frames {
-    /// Follows the commits of a running instance; `None` of a recording, where nothing happens.
+    /// Follows a running instance; `None` of a recording, where nothing happens.
     pub(super) fn follow(looker: &mut Looker) -> Result<Option<Self>, Failure> {
         let Source::Live(session) = &mut looker.source else {
             return Ok(None);
         };
-        let changes = session.changes(Filter::default());
         Ok(Some(Self {
-            changes: changes.map_err(Failure::internal)?,
+            follower: Follower::new(&session.snapshot().map_err(Failure::internal)?),
+            laser: Laser::open(session).map_err(Failure::internal)?,
             map: None,
             missions: None,
             processes: Processes::of(session.instance()),
@@ -47,35 +43,24 @@ impl Frames {
     /// What is new; `None` where nothing is.
     pub(super) fn next(&mut self, looker: &mut Looker) -> Result<Option<Json>, Failure> {
         let snapshot = looker.newest()?;
-        let mut news = News::default();
-        while let Some(update) = self
-            .changes
-            .next(snapshot.schema())
-            .map_err(Failure::internal)?
-        {
-            match update {
-                // Everything may have changed.
-                Update::Gap(_) => news.structure = true,
-                Update::Change(change) => news.take(change),
-            }
-        }
+        let news = self.follower.next(&snapshot);
+        let laser = self.laser.look().map_err(Failure::internal)?;
         self.count += 1;
-        let mut frame = json!({"version": snapshot.version().0, "time": snapshot.time().seconds()});
         let look = self.count % PROCESSES_EVERY == 1;
-        if news.is_empty() && !look {
+        if news.count == 0 && laser.is_none() && !look {
             return Ok(None);
         }
+        let mut frame = json!({
+            "version": snapshot.version().0, "time": snapshot.time().seconds(),
+            "structure": news.structure, "changed": news.changed, "commits": news.commits,
+            "count": news.count,
+        });
         if look {
             frame["processes"] = self.processes.look();
         }
-        frame["structure"] = json!(news.structure);
-        frame["changed"] = json!(news.changed);
-        frame["commits"] = news
-            .commits
-            .iter()
-            .map(|change| line(&snapshot, change))
-            .collect();
-        frame["count"] = json!(news.count);
+        if let Some(laser) = laser {
+            frame["laser"] = laser;
+        }
         // What is overtaken now comes with the next frame.
         if let Ok(map) = Map::of(&snapshot)
             && self.map.as_ref() != Some(&map)
@@ -91,67 +76,4 @@ impl Frames {
         }
         Ok(Some(frame))
     }
-}
-
-/// What commits did since the last frame.
-#[derive(Default)]
-struct News {
-    structure: bool,
-    changed: BTreeSet<u64>,
-    commits: Vec<Change>,
-    count: u64,
-}
-
-impl News {
-    fn is_empty(&self) -> bool {
-        self.count == 0 && !self.structure
-    }
-
-    fn take(&mut self, change: Change) {
-        self.count += 1;
-        for node in &change.nodes {
-            self.structure |= node.touch != Touch::Updated;
-            self.changed.insert(node.node.0);
-        }
-        for edge in &change.edges {
-            self.structure |= edge.touch != Touch::Updated;
-            self.changed.insert(edge.edge.to.0);
-        }
-        if self.commits.len() == TOLD {
-            self.commits.remove(0);
-        }
-        self.commits.push(change);
-    }
-}
-
-/// A commit in a line.
-pub(super) fn line(snapshot: &Snapshot, change: &Change) -> Json {
-    let schema = snapshot.schema();
-    let mut what = BTreeSet::new();
-    for node in &change.nodes {
-        what.insert(name_of(snapshot, node.node));
-    }
-    for edge in &change.edges {
-        let label = schema.label_name(edge.edge.label);
-        what.insert(format!("{} -{label}->", name_of(snapshot, edge.edge.from)));
-    }
-    let more = what.len().saturating_sub(NAMED);
-    let mut what: Vec<String> = what.into_iter().take(NAMED).collect();
-    if more > 0 {
-        what.push(format!("and {more} more"));
-    }
-    let rules: Vec<String> = change
-        .rules
-        .iter()
-        .map(|applied| {
-            let bound =
-                |(variable, id): &(String, _)| format!("{variable}={}", name_of(snapshot, *id));
-            let binding: Vec<String> = applied.binding.iter().map(bound).collect();
-            format!("{}({})", applied.rule, binding.join(", "))
-        })
-        .collect();
-    json!({
-        "version": change.version.0, "time": change.time.seconds(), "agent": change.agent,
-        "rules": rules, "what": what.join(", "),
-    })
 }

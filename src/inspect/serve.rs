@@ -14,6 +14,7 @@ use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use futures_util::stream::{self, Stream};
+use miette::{GraphicalReportHandler, GraphicalTheme};
 use serde_json::{Value as Json, json};
 use std::convert::Infallible;
 use std::net::{IpAddr, SocketAddr, TcpListener};
@@ -140,7 +141,15 @@ fn failed(failure: Failure) -> Response {
     };
     let report = failure.into_report();
     let help = report.help().map(|help| help.to_string());
-    said(status, &json!({"error": report.to_string(), "help": help}))
+    let mut whole = String::new();
+    // Writing to a string does not fail.
+    let _ = GraphicalReportHandler::new_themed(GraphicalTheme::unicode_nocolor())
+        .with_links(false)
+        .render_report(&mut whole, report.as_ref());
+    said(
+        status,
+        &json!({"error": report.to_string(), "help": help, "report": whole.trim()}),
+    )
 }
 
 fn gone() -> Response {

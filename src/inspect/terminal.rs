@@ -229,7 +229,12 @@ fn rows(json: &Json) -> impl Iterator<Item = &Json> {
 fn commit_line(commit: &Json) -> String {
     let rules: Vec<String> = rows(&commit["rules"]).map(text).collect();
     let time = commit["time"].as_f64().unwrap_or_default();
-    let (agent, what) = (text(&commit["agent"]), text(&commit["what"]));
+    let agent = text(&commit["agent"]);
+    let mut what: Vec<String> = rows(&commit["what"]).map(text).collect();
+    if let Some(more @ 1..) = commit["more"].as_u64() {
+        what.push(format!("and {more} more"));
+    }
+    let what = what.join(", ");
     let time = clock(Time::from_seconds(time));
     format!("{time} {agent} {} {what}", rules.join(" "))
 }

@@ -1,6 +1,7 @@
 //! The map: walls, rooms, people with their zones, groups, objects with their spaces, the robot and
 //! where it goes. Lengths in metres and angles in radians, in the world's frame.
 
+use super::sight::outline;
 use dsr::{Element, Node, ReadError, Snapshot, Value};
 use serde::Serialize;
 
@@ -25,6 +26,7 @@ pub(crate) struct Map {
     pub(crate) groups: Vec<Group>,
     pub(crate) objects: Vec<Object>,
     pub(crate) robots: Vec<Robot>,
+    pub(crate) problems: Vec<Problem>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -38,8 +40,10 @@ pub(crate) struct Room {
 pub(crate) struct Thing {
     pub(crate) name: String,
     pub(crate) place: Place,
-    /// A camera's opening angle and range.
+    /// A camera's opening angle and range,
     pub(crate) sees: Option<[f64; 2]>,
+    /// and the outline of what it sees between the walls.
+    pub(crate) view: Vec<Point>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -72,6 +76,8 @@ pub(crate) struct Object {
     /// The outline of its space, and R(t).
     pub(crate) space: Vec<Point>,
     pub(crate) usage: Option<f64>,
+    /// Where else it may be, the likeliest first: x, y, heading and probability of each.
+    pub(crate) places: Vec<[f64; 4]>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -79,8 +85,17 @@ pub(crate) struct Robot {
     pub(crate) name: String,
     pub(crate) place: Place,
     pub(crate) radius: f64,
-    /// What is still to go.
+    /// The elastic band that is still to go, the radii of its bubbles, and the path that it was laid along.
     pub(crate) path: Vec<Point>,
+    pub(crate) bubbles: Vec<f64>,
+    pub(crate) planned: Vec<Point>,
+}
+
+/// What was entered at a node and cannot be used, as an agent says there.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Problem {
+    pub(crate) node: String,
+    pub(crate) text: String,
 }
 
 fn number(element: &Element<'_>, name: &str) -> Result<Option<f64>, ReadError> {
@@ -177,11 +192,23 @@ impl Map {
             });
         }
         map.rooms.sort_by(|a, b| a.name.cmp(&b.name));
-        let thing = |name, place, sees| Thing { name, place, sees };
-        map.places = placed(snapshot, "place", |_, name, at| Ok(thing(name, at, None)))?;
-        map.cameras = placed(snapshot, "camera", |node, name, at| {
+        map.places = placed(snapshot, "place", |_, name, place| {
+            Ok(Thing {
+                name,
+                place,
+                sees: None,
+                view: Vec::new(),
+            })
+        })?;
+        map.cameras = placed(snapshot, "camera", |node, name, place| {
             let sees = number(node, "field_of_view")?.zip(number(node, "range")?);
-            Ok(thing(name, at, sees.map(|(angle, range)| [angle, range])))
+            let view = sees.map(|(angle, range)| outline(place, angle, range, &map.walls));
+            Ok(Thing {
+                name,
+                place,
+                sees: sees.map(|(angle, range)| [angle, range]),
+                view: view.unwrap_or_default(),
+            })
         })?;
         map.people = placed(snapshot, "person", |node, name, at| {
             person(snapshot, node, name, at)
@@ -201,8 +228,11 @@ impl Map {
                 place,
                 radius: number(node, "radius")?.unwrap_or(0.25),
                 path: points(node, "path")?,
+                bubbles: numbers(node, "bubbles")?,
+                planned: points(node, "planned_path")?,
             })
         })?;
+        map.problems = problems(snapshot)?;
         Ok(map)
     }
 }
@@ -237,7 +267,30 @@ fn object(node: &Node<'_>, name: String, place: Place) -> Result<Object, ReadErr
         size: rows(&size).first().copied().unwrap_or([0.5, 0.5]),
         space: points(node, "space")?,
         usage: number(node, "usage")?,
+        // Beside these, visits and when it was last seen there.
+        places: rows::<6>(&numbers(node, "places")?)
+            .into_iter()
+            .map(|[x, y, heading, probability, ..]| [x, y, heading, probability])
+            .collect(),
     })
+}
+
+fn problems(snapshot: &Snapshot) -> Result<Vec<Problem>, ReadError> {
+    let mut found = Vec::new();
+    for kind in ["world", "activity", "person"] {
+        for node in snapshot.nodes_of(kind) {
+            let node = node?;
+            let value = node.value("problems")?;
+            if let Some(text) = value.as_ref().and_then(Value::as_str)
+                && !text.is_empty()
+            {
+                let (node, text) = (node.name()?, text.to_owned());
+                found.push(Problem { node, text });
+            }
+        }
+    }
+    found.sort_by(|a, b| a.node.cmp(&b.node));
+    Ok(found)
 }
 
 #[cfg(test)]
@@ -262,7 +315,24 @@ mod tests {
             attributes: vec![("transform".into(), Value::Pose(planar_pose(&pose)))],
         });
         graph.commit(&transaction, "test", Time::default()).unwrap();
+        let mut cup = Transaction::new();
+        let places = Value::F64List(vec![
+            1.0, 2.0, 0.0, 0.7, 3.0, 5.0, 2.0, 2.0, 0.0, 0.3, 1.0, 4.0,
+        ]);
+        cup.create_node("object", "cup", vec![("places".into(), places)]);
+        cup.push(Operation::CreateEdge {
+            edge: EdgeRef::new("w", "pose", "cup"),
+            attributes: vec![("transform".into(), Value::Pose(planar_pose(&pose)))],
+        });
+        cup.set("w", "problems", "the walls cross");
+        graph.commit(&cup, "test", Time::default()).unwrap();
         let map = Map::of(&graph.snapshot()).unwrap();
+        let places = &map.objects[0].places;
+        assert_eq!(places[..], [[1.0, 2.0, 0.0, 0.7], [2.0, 2.0, 0.0, 0.3]]);
+        assert_eq!(
+            (&*map.problems[0].node, &*map.problems[0].text),
+            ("w", "the walls cross")
+        );
         assert_eq!(map.frame, "w");
         assert_eq!(map.walls, [[0.0, 0.0, 4.0, 0.0]]);
         let [ana] = &map.people[..] else {

@@ -6,12 +6,14 @@ mod groups;
 mod problems;
 mod read;
 mod settings;
+mod usage;
 
 use groups::GroupNodes;
 pub use groups::{EXTENT, FEATURES, GROUP, MEMBER};
 pub use problems::PROBLEMS;
 pub use read::scene;
 use settings::Settings;
+pub use usage::usages;
 
 use super::adaptation::Passage;
 use super::config::{ConfigError, SocialConfig};

@@ -7,6 +7,7 @@ use super::drawn::{Drawn, inflation};
 use super::found::{FoundGroup, found_groups};
 use super::four_sided::FourSided;
 use super::layers::Layer;
+use super::object_space::UsageCurve;
 use super::personal::{CooperationZone, passages_of, shape_of};
 use super::rejection::Rejection;
 use super::scene::{Object, Person, SceneError, SocialScene};
@@ -212,11 +213,7 @@ impl SocialMapper {
                 .into(),
             };
             kept.push(((*object).clone(), Arc::clone(&outline)));
-            let curve = self
-                .config
-                .usage_of
-                .get(&object.name)
-                .unwrap_or(&self.config.usage);
+            let curve = self.curve(&object.name);
             uses.push(ObjectUse {
                 name: object.name.clone(),
                 world_from_object: object.world_from_object,
@@ -226,6 +223,23 @@ impl SocialMapper {
         }
         drawn.spaces = kept;
         uses
+    }
+
+    fn curve(&self, object: &str) -> &UsageCurve {
+        let own = self.config.usage_of.get(object);
+        own.unwrap_or(&self.config.usage)
+    }
+
+    /// R(t) of the objects of a scene that have a space, by name, at each of the times.
+    pub fn usages(&self, scene: &SocialScene, times: &[Time]) -> BTreeMap<String, Vec<f64>> {
+        let has_space = |object: &&&Object| self.config.spaces.contains_key(&object.class);
+        let objects = scene.sound_objects(&mut Vec::new());
+        let usages = objects.iter().filter(has_space).map(|object| {
+            let (curve, agenda) = (self.curve(&object.name), scene.agenda(&object.name));
+            let usages = times.iter().map(|time| curve.usage(*time, &agenda));
+            (object.name.clone(), usages.collect())
+        });
+        usages.collect()
     }
 
     fn object_stamps(

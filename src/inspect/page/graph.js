@@ -1,7 +1,7 @@
 // The graph: nodes in clusters by type and room, where the program put them; edges; what just changed
 // lights up and fades.
 
-import { colour, ink } from './canvas.js';
+import { colour, ink, Names } from './canvas.js';
 
 const FADE = 900; // ms
 
@@ -15,6 +15,7 @@ export class GraphView {
     this.hidden = new Set();
     this.lit = new Map();
     this.selected = null;
+    this.matches = new Set();
   }
 
   set(graph) {
@@ -70,6 +71,7 @@ export class GraphView {
       pen.fillStyle = colour(type);
       pen.fill();
     }
+    this.drawMatches(pen, scale, r);
     this.drawLit(pen, scale, r);
     const chosen = this.nodes.get(this.selected);
     if (this.shown(chosen)) {
@@ -97,19 +99,30 @@ export class GraphView {
     if (this.lit.size) this.board.redraw();
   }
 
+  drawMatches(pen, scale, r) {
+    pen.beginPath();
+    for (const id of this.matches) {
+      const node = this.nodes.get(id);
+      if (!this.shown(node)) continue;
+      pen.moveTo(node.x + r + 3, node.y);
+      pen.arc(node.x, node.y, r + 3, 0, 7);
+    }
+    pen.lineWidth = 2 / Math.min(scale, 1);
+    pen.strokeStyle = ink('--bad');
+    pen.stroke();
+  }
+
   drawNames(pen, scale, byType, r) {
+    const names = new Names(pen, 11 / Math.min(Math.max(scale, 0.4), 2));
+    const put = (node, always) => names.put(node.name, node.x, node.y - r - 3, ink('--ink'), always);
+    const chosen = this.nodes.get(this.selected);
+    if (this.shown(chosen)) put(chosen, true);
+    for (const id of this.matches) if (this.shown(this.nodes.get(id))) put(this.nodes.get(id));
     let count = 0;
     for (const nodes of byType.values()) count += nodes.length;
-    // Names where they can be read: of all, or only of what is chosen.
-    const all = count <= 150 || (scale > 0.75 && count < 600);
-    pen.fillStyle = ink('--ink');
-    pen.font = `${11 / Math.min(Math.max(scale, 0.4), 2)}px system-ui, sans-serif`;
-    pen.textAlign = 'center';
-    for (const nodes of byType.values()) {
-      for (const node of nodes) {
-        if (all || node.id === this.selected) pen.fillText(node.name, node.x, node.y - r - 3);
-      }
-    }
+    // Names where they can be read.
+    if (count > 600 || (count > 150 && scale < 0.75)) return;
+    for (const nodes of byType.values()) for (const node of nodes) if (node !== chosen) put(node);
   }
 
   pick(x, y, scale) {
@@ -122,11 +135,14 @@ export class GraphView {
     return best;
   }
 
-  find(name) {
-    for (const node of this.nodes.values()) if (node.name === name) return node;
-    const part = name.toLowerCase();
-    for (const node of this.nodes.values()) if (part && node.name.toLowerCase().includes(part)) return node;
-    return null;
+  // The nodes whose name has a text in it, the one that is called so first; what is found is marked.
+  search(text) {
+    const part = text.trim().toLowerCase();
+    const all = part ? [...this.nodes.values()].filter((node) => node.name.toLowerCase().includes(part)) : [];
+    all.sort((a, b) => (b.name.toLowerCase() === part) - (a.name.toLowerCase() === part));
+    this.matches = new Set(all.map((node) => node.id));
+    this.board.redraw();
+    return all;
   }
 
   describe() { return `The graph: ${this.nodes.size} nodes and ${this.edges.length} edges`; }

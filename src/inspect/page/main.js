@@ -1,213 +1,185 @@
 // The page: what is chosen, as of when, and in which view. Everything it knows it asks of the program
 // that served it.
 
+import { Strip } from './agenda.js';
 import { Board, colour } from './canvas.js';
+import { Details } from './details.js';
+import { button, clock, element } from './element.js';
+import { missionForm, ruleForm } from './forms.js';
 import { GraphView } from './graph.js';
-import { MapView } from './map.js';
-import { agents, clock, element, missions, table } from './mission.js';
+import { Log } from './log.js';
+import { LAYERS, MapView } from './map.js';
+import { agents, changeActivity, missions } from './mission.js';
 
 const $ = (id) => document.getElementById(id);
-const state = { about: null, at: null, tab: 'graph', chosen: null, playing: null, missions: [], agenda: [], processes: null, rates: new Map(), gridOf: null };
+const TABS = ['graph', 'map', 'mission', 'agents'];
+const state = { about: null, at: null, tab: 'graph', playing: null, missions: [], agenda: null, processes: null, rates: new Map(), asked: new Map() };
 const hash = new URLSearchParams(location.hash.slice(1));
 const token = hash.get('token');
 const still = hash.has('still'); // looks once and follows nothing: for pictures
 
-async function ask(what, question = {}) {
-  const query = new URLSearchParams(Object.entries(question).filter(([, value]) => value !== null && value !== undefined));
-  const answer = await fetch(`/api/${what}?${query}`);
-  const json = await answer.json();
-  if (!answer.ok) throw new Error([json.error, json.help].filter(Boolean).join('; '));
+async function answered(response) {
+  const json = await response.json();
+  if (!response.ok) throw Object.assign(new Error([json.error, json.help].filter(Boolean).join('; ')), { report: json.report });
   return json;
 }
 
-async function edit(change) {
-  const answer = await fetch('/api/edit', { method: 'POST', headers: { 'x-cortex-token': token ?? '' }, body: JSON.stringify(change) });
-  const json = await answer.json();
-  say(answer.ok ? `done: version ${json.version}` : json.error, !answer.ok);
-  if (answer.ok && state.chosen !== null) showNode(state.chosen);
+async function ask(what, question = {}) {
+  const given = Object.entries({ at: state.at, ...question }).filter(([, value]) => value !== null && value !== undefined);
+  return answered(await fetch(`/api/${what}?${new URLSearchParams(given)}`));
 }
 
-const say = (text, bad = false) => { $('status').textContent = text; $('status').classList.toggle('bad', bad); };
-const then = () => ({ at: state.at });
-const mayEdit = () => state.about?.allow_edit && token;
+async function edit(change) {
+  const json = await answered(await fetch('/api/edit', { method: 'POST', headers: { 'x-cortex-token': token ?? '' }, body: JSON.stringify(change) }));
+  details.again();
+  loadRest().catch(failed);
+  return json;
+}
 
+const say = (text, bad = false) => {
+  // Only what is new is told aloud.
+  if ($('status').textContent !== text) $('status').textContent = text;
+  $('status').classList.toggle('bad', bad);
+};
+const failed = (error) => say(error.message, true);
+const mayEdit = () => Boolean(state.about?.allow_edit && token);
+const now = () => state.at ?? state.about.newest;
+// Whether something was not done for so many milliseconds, and then counts as done.
+const due = (what, every) => {
+  const time = performance.now();
+  if (time - (state.asked.get(what) ?? -Infinity) < every) return false;
+  state.asked.set(what, time);
+  return true;
+};
+
+const why = (path) => details.showWhy(path);
+const page = { why, goTo, go, mayEdit, edit, sifted: () => loadLog().catch(failed), changes: (row) => changeActivity($('forms').querySelector('.activity'), row, edit) };
 const board = new Board($('canvas'), (id) => choose(id));
 const graph = new GraphView(board);
 const map = new MapView(board);
+const details = new Details($('selected'), ask, page);
+const log = new Log({ list: $('log'), ruled: $('ruled'), author: $('author'), held: $('held') }, page);
+const strip = new Strip($('strip'), (usage) => { map.usage = usage; board.redraw(); });
 
 async function loadGraph() {
-  const whole = await ask('graph', then());
-  graph.set(whole);
+  graph.set(await ask('graph'));
   map.ids = new Map([...graph.nodes.values()].map((node) => [node.name, node.id]));
   const kinds = new Map();
   for (const node of graph.nodes.values()) kinds.set(node.type, (kinds.get(node.type) ?? 0) + 1);
-  showFilters(kinds);
+  showChoices($('filters'), [...kinds].sort().map(([type, count]) => [type, colour(type), `${type} ${count}`]), graph.hidden);
   $('names').replaceChildren(...[...graph.nodes.values()].slice(0, 2000).map(({ name }) => element('option', null, { value: name })));
   describe();
   requestAnimationFrame(() => { document.body.dataset.drawn ??= Math.round(performance.now()); });
 }
 
-function showFilters(kinds) {
-  const boxes = [...kinds].sort().map(([type, count]) => {
+// Boxes for what is shown, each as key, colour and words; what is not ticked is `hidden`.
+function showChoices(place, choices, hidden) {
+  const told = JSON.stringify(choices);
+  if (place.dataset.told === told) return;
+  place.dataset.told = told;
+  place.replaceChildren(place.querySelector('legend'), ...choices.map(([key, of, words]) => {
     const label = element('label');
     const box = element('input', null, { type: 'checkbox' });
-    box.checked = !graph.hidden.has(type);
-    box.onchange = () => { graph.hidden[box.checked ? 'delete' : 'add'](type); board.redraw(); };
+    box.checked = !hidden.has(key);
+    box.onchange = () => { hidden[box.checked ? 'delete' : 'add'](key); board.redraw(); };
     const swatch = element('span', null, { class: 'swatch' });
-    swatch.style.background = colour(type);
-    label.append(box, swatch, `${type} ${count}`);
+    swatch.style.background = of;
+    label.append(box, swatch, words);
     return label;
-  });
-  $('filters').replaceChildren($('filters').querySelector('legend'), ...boxes);
+  }));
+}
+
+async function loadLog() {
+  log.set(await ask('commits', { rules: $('ruled').checked || null, agent: $('author').value || null }));
+}
+
+async function loadAgenda() {
+  state.agenda = await ask('agenda');
+  strip.set(state.agenda);
 }
 
 async function loadRest() {
-  const [place, list, agenda] = await Promise.all([ask('map', then()), ask('missions', then()), ask('agenda', then())]);
-  map.set(place);
-  [state.missions, state.agenda] = [list, agenda];
+  const [place, list] = await Promise.all([ask('map'), ask('missions'), loadAgenda(), loadLog()]);
+  setMap(place);
+  state.missions = list;
   if (state.at === null && state.tab === 'map') loadGrid(); else map.setGrid(null);
-  if (state.at !== null) {
-    $('log').replaceChildren();
-    showCommits((await ask('commits', then())).reverse());
-  }
+  if (state.at !== null) map.setLaser(null);
   showText();
   describe();
 }
 
+function setMap(place) {
+  map.set(place);
+  const told = JSON.stringify(place.problems);
+  if ($('problems').dataset.told === told) return;
+  $('problems').dataset.told = told;
+  $('problems').hidden = !place.problems.length;
+  $('problems').replaceChildren(...place.problems.map(({ node, text }) => {
+    const line = element('li');
+    line.append(button(node, () => go(map.ids.get(node)), { link: true }), `: ${text.trim()}`);
+    return line;
+  }));
+}
+
 async function loadGrid() {
-  if (state.gridOf && performance.now() - state.gridOf < 1000) return;
-  state.gridOf = performance.now();
-  map.setGrid(await ask('grid').catch(() => null));
+  if (due('grid', 1000)) map.setGrid(await ask('grid', { at: null }).catch(() => null));
 }
 
 async function choose(id) {
-  state.chosen = id;
   graph.selected = map.selected = id;
   board.redraw();
-  if (id !== null) await showNode(id);
-}
-
-async function showNode(id) {
-  try {
-    const node = await ask('node', { id, ...then() });
-    const place = $('selected');
-    const title = element('h2', node.name);
-    title.append(' ', element('span', node.type, { class: 'soft' }), ' ', whyButton(node.name));
-    const rows = node.attributes.map((one) => {
-      const path = `${node.name}.${one.name}`;
-      const past = element('button', 'history', { 'aria-label': `History of ${one.name}` });
-      past.onclick = () => showHistory(path);
-      const age = one.age < 120 ? `${one.age.toFixed(1)} s` : `${(one.age / 60).toFixed(0)} min`;
-      const buttons = element('span');
-      buttons.append(past, ' ', whyButton(path));
-      const value = element('span', one.text.length > 160 ? `${one.text.slice(0, 160)} \u2026` : one.text, { title: one.text });
-      value.append(element('br'), element('small', `${one.writer}, ${age} ago`, { class: 'soft' }));
-      return [one.name, value, buttons];
-    });
-    const edges = node.edges.map((edge) => [other(edge.from, edge.from_id), edge.label, other(edge.to, edge.to_id)]);
-    place.replaceChildren(title, table(['attribute', 'value, by whom, how old', ''], rows), element('h2', 'Edges'), table(['from', 'label', 'to'], edges));
-    if (mayEdit()) place.append(setForm(node));
-  } catch (error) { say(error.message, true); }
-}
-
-function other(name, id) {
-  const button = element('button', name);
-  button.onclick = () => go(id);
-  return button;
-}
-
-function whyButton(path) {
-  const button = element('button', 'why', { 'aria-label': `Why ${path}` });
-  button.onclick = () => showWhy(path);
-  return button;
-}
-
-function setForm(node) {
-  const form = element('form');
-  const name = element('input', null, { placeholder: 'attribute', 'aria-label': 'Attribute', required: '' });
-  const value = element('input', null, { placeholder: 'value', 'aria-label': 'Value', required: '' });
-  form.append(name, value, element('button', 'Set'));
-  form.onsubmit = (e) => { e.preventDefault(); edit({ kind: 'set', path: `${node.name}.${name.value}`, value: value.value }); };
-  return form;
-}
-
-async function showWhy(path) {
-  try {
-    const { text } = await ask('why', { path, ...then() });
-    const back = element('button', 'back');
-    back.onclick = () => (state.chosen === null ? $('selected').replaceChildren() : showNode(state.chosen));
-    $('selected').replaceChildren(element('h2', `Why ${path}`), element('pre', text), back);
-    $('details').focus();
-  } catch (error) { say(error.message, true); }
-}
-
-async function showHistory(path) {
-  try {
-    const { entries } = await ask('history', { path, ...then() });
-    const rows = entries.map((entry) => [clock(entry.time), entry.agent, (entry.rules ?? []).join(', '), entry.text ?? JSON.stringify(entry.value)]);
-    const back = element('button', 'back');
-    back.onclick = () => showNode(state.chosen);
-    $('selected').replaceChildren(element('h2', `History of ${path}`), table(['time', 'by', 'rule', 'value'], rows), back);
-  } catch (error) { say(error.message, true); }
+  if (id !== null) say(`${graph.nodes.get(id)?.name ?? id} is chosen`);
+  await details.choose(id);
 }
 
 function go(id) {
+  if (id === undefined) return;
   const node = graph.nodes.get(id);
   if (node && state.tab === 'graph') board.centre(node.x, node.y);
   choose(id);
 }
 
 function showText() {
-  if (state.tab === 'mission') {
-    const now = state.at ?? state.about.newest;
-    missions($('text'), state.missions, state.agenda, map.map, now, { why: showWhy, ask: mayEdit() ? edit : null });
-    if (mayEdit()) $('text').append(missionForm(), ruleForm());
-  } else if (state.tab === 'agents') agents($('text'), state.processes, state.rates);
+  if (state.tab === 'mission') missions($('told'), state.missions, state.agenda, map.map, now(), { ...page, edit: mayEdit() ? edit : null });
+  else if (state.tab === 'agents') agents($('told'), state.processes, state.rates, now());
+  $('forms').hidden = state.tab !== 'mission';
 }
 
-function missionForm() {
-  const form = element('form');
-  const name = element('input', null, { placeholder: 'name', 'aria-label': 'Name of the mission', required: '' });
-  const goal = element('textarea', null, { placeholder: 'goal in AGGL', 'aria-label': 'Goal', required: '', rows: '3' });
-  form.append(element('h3', 'Submit a mission'), name, goal, element('button', 'Submit'));
-  form.onsubmit = (e) => { e.preventDefault(); edit({ kind: 'mission', name: name.value, goal: goal.value }); };
-  return form;
-}
-
-function ruleForm() {
-  const form = element('form');
-  const rule = element('input', null, { placeholder: 'rule', 'aria-label': 'Rule', required: '' });
-  const bound = element('input', null, { placeholder: 'variable=node, ...', 'aria-label': 'Binding' });
-  form.append(element('h3', 'Apply a rule'), rule, bound, element('button', 'Apply'));
-  form.onsubmit = (e) => {
-    e.preventDefault();
-    const pairs = bound.value.split(',').map((pair) => pair.split('=').map((part) => part.trim())).filter(([variable]) => variable);
-    edit({ kind: 'rule', rule: rule.value, binding: Object.fromEntries(pairs) });
-  };
-  return form;
+async function makeForms() {
+  if (!mayEdit()) {
+    const help = state.about.live ? 'Start the inspector with --allow-edit, and open the address that it prints, to submit missions, apply rules and change the agenda here.' : 'A recording is read, not written.';
+    $('forms').append(element('p', help, { class: 'soft' }));
+    return;
+  }
+  const rules = await ask('rules').catch(() => []);
+  $('forms').append(element('div', null, { class: 'activity' }), missionForm(edit), ruleForm(rules, edit));
 }
 
 function describe() {
-  $('canvas').setAttribute('aria-label', (state.tab === 'map' ? map : graph).describe());
+  const what = (state.tab === 'map' ? map : graph).describe();
+  const told = `${what}. Arrows move, plus and minus magnify, 0 shows all.`;
+  if ($('canvas').getAttribute('aria-label') !== told) $('canvas').setAttribute('aria-label', told);
 }
 
 function show(tab) {
   state.tab = tab;
-  for (const button of document.querySelectorAll('[role=tab]')) {
-    const chosen = button.id === `tab-${tab}`;
-    button.setAttribute('aria-selected', chosen);
-    button.tabIndex = chosen ? 0 : -1;
+  for (const each of document.querySelectorAll('[role=tab]')) {
+    const chosen = each.id === `tab-${tab}`;
+    each.setAttribute('aria-selected', chosen);
+    each.tabIndex = chosen ? 0 : -1;
   }
   $('view').setAttribute('aria-labelledby', `tab-${tab}`);
   const drawn = tab === 'graph' || tab === 'map';
   $('canvas').hidden = !drawn;
-  $('canvas').style.display = drawn ? '' : 'none';
-  $('tools').style.display = tab === 'graph' ? '' : 'none';
+  $('tools-graph').hidden = tab !== 'graph';
+  $('tools-map').hidden = $('below').hidden = tab !== 'map';
   $('text').hidden = drawn;
+  $('text').setAttribute('aria-label', tab === 'agents' ? 'Agents' : 'Mission');
   if (drawn) { board.show(tab === 'map' ? map : graph); board.resize(); describe(); }
   if (tab === 'map' && state.at === null) loadGrid();
-  showText();
-  location.hash = new URLSearchParams({ ...(token ? { token } : {}), ...(still ? { still: '' } : {}), view: tab }).toString();
+  if (state.about) showText();
+  const kept = new URLSearchParams({ ...(token ? { token } : {}), ...(still ? { still: '' } : {}), view: tab });
+  history.replaceState(null, '', `#${kept}`);
 }
 
 // Time.
@@ -216,11 +188,14 @@ const span = () => [state.about.oldest, state.about.newest];
 
 function showClock() {
   const [oldest, newest] = span();
-  const at = state.at ?? newest;
-  $('clock').value = `${clock(at)} (${(at - newest).toFixed(1)} s)`;
-  $('time').value = newest > oldest ? (1000 * (at - oldest)) / (newest - oldest) : 1000;
-  $('time').setAttribute('aria-valuetext', $('clock').value);
+  // On the grid of its steps, so that it comes to its ends.
+  [$('time').min, $('time').max] = [Math.floor(oldest * 10 + 1e-5) / 10, Math.ceil(newest * 10 - 1e-5) / 10];
+  $('time').value = state.at ?? $('time').max;
+  $('clock').value = `${clock(now())} (${(now() - newest).toFixed(1)} s)`;
+  // Which is told aloud while it is moved, not with each commit.
+  $('time').setAttribute('aria-valuetext', state.at === null ? 'now' : $('clock').value);
   $('now').setAttribute('aria-pressed', state.at === null);
+  $('version').hidden = state.at !== null;
 }
 
 let loading = false;
@@ -231,8 +206,9 @@ async function load() {
   loading = true;
   try {
     await Promise.all([loadGraph(), loadRest()]);
-    if (state.chosen !== null && graph.nodes.has(state.chosen)) await showNode(state.chosen);
-  } catch (error) { say(error.message, true); }
+    await details.again();
+    showClock();
+  } catch (error) { failed(error); }
   loading = false;
   if (again) { again = false; load(); }
 }
@@ -240,16 +216,17 @@ async function load() {
 function goTo(at) {
   const [oldest, newest] = span();
   state.at = at === null || (state.about.live && at >= newest) ? null : Math.min(Math.max(at, oldest), newest);
+  say(state.at === null ? 'live' : state.about.live ? 'as it was then: Now goes back' : 'a recording');
   showClock();
   load();
 }
 
 function play() {
   if (state.playing) { clearInterval(state.playing); state.playing = null; } else {
-    if (state.at === null) state.at = span()[0];
+    if (state.at === null || (!state.about.live && state.at >= span()[1])) state.at = span()[0];
     state.playing = setInterval(() => {
       if (state.at === null || (!state.about.live && state.at >= span()[1])) { play(); return; }
-      goTo(state.at + 0.2);
+      if (!loading) goTo(state.at + 0.2);
     }, 200);
   }
   $('play').setAttribute('aria-label', state.playing ? 'Pause' : 'Play');
@@ -258,38 +235,35 @@ function play() {
 
 // What happens.
 
+function count(commit) {
+  const rate = state.rates.get(commit.agent) ?? { count: 0, since: commit.time, rate: 0 };
+  rate.count += 1;
+  rate.time = commit.time;
+  if (commit.time - rate.since > 2) Object.assign(rate, { rate: rate.count / (commit.time - rate.since), count: 0, since: commit.time });
+  state.rates.set(commit.agent, rate);
+}
+
 function tell(frame) {
   if (frame.processes) state.processes = frame.processes;
   state.about.newest = Math.max(state.about.newest, frame.time);
-  for (const commit of frame.commits ?? []) {
-    const rate = state.rates.get(commit.agent) ?? { count: 0, since: commit.time, rate: 0 };
-    rate.count += 1;
-    rate.time = commit.time;
-    if (commit.time - rate.since > 2) Object.assign(rate, { rate: rate.count / (commit.time - rate.since), count: 0, since: commit.time });
-    state.rates.set(commit.agent, rate);
-  }
-  if (state.at !== null) { showClock(); return; }
-  showCommits(frame.commits ?? []);
-  if (frame.structure) loadGraph().catch((error) => say(error.message, true));
-  if (state.tab === 'graph') graph.light(frame.changed ?? []);
-  if (frame.map) map.set(frame.map);
+  if (frame.processes && due('about', 5000)) ask('about').then((about) => { state.about.oldest = about.oldest; }, () => {});
+  frame.commits.forEach(count);
   if (frame.missions) state.missions = frame.missions;
-  if (frame.missions || frame.processes) showText();
-  if (state.tab === 'map') loadGrid();
-  say(`live, version ${frame.version}`);
+  if (state.at !== null) { showClock(); return; }
+  log.add(frame.commits);
+  if (frame.structure) loadGraph().catch(failed);
+  if (state.tab === 'graph') graph.light(frame.changed);
+  if (frame.map) setMap(frame.map);
+  if (frame.laser) map.setLaser(frame.laser);
+  const touched = new Set(frame.changed);
+  if (frame.structure || state.agenda?.activities.some((one) => touched.has(one.id))) loadAgenda().then(showText, failed);
+  strip.tick(frame.time);
+  if (frame.missions || (frame.processes && state.tab === 'agents') || due('text', 10000)) showText();
+  if ((touched.has(details.chosen) || frame.processes) && due('node', 900)) details.again();
+  if (state.tab === 'map') { loadGrid(); describe(); }
+  say('live');
+  $('version').textContent = `, version ${frame.version}`;
   showClock();
-}
-
-function showCommits(commits) {
-  for (const commit of commits) {
-    const line = element('li');
-    line.append(element('span', clock(commit.time), { class: 'soft' }), ' ', element('b', commit.agent), ' ');
-    if (commit.rules.length) line.append(element('span', commit.rules.join(', '), { class: 'rule' }), ' ');
-    line.append(commit.what ?? '');
-    line.title = `version ${commit.version}`;
-    $('log').prepend(line);
-  }
-  while ($('log').children.length > 80) $('log').lastChild.remove();
 }
 
 function listen() {
@@ -304,28 +278,39 @@ async function begin() {
   $('instance').textContent = state.about.instance;
   if (!state.about.live) { state.at = state.about.newest; $('now').disabled = true; say('a recording'); load(); } else if (still) load(); else listen();
   showClock();
+  makeForms();
   const wanted = hash.get('view');
-  show(['graph', 'map', 'mission', 'agents'].includes(wanted) ? wanted : 'graph');
+  show(TABS.includes(wanted) ? wanted : 'graph');
 }
 
-for (const button of document.querySelectorAll('[role=tab]')) {
-  button.onclick = () => show(button.id.slice(4));
-  button.onkeydown = (e) => {
+for (const tab of document.querySelectorAll('[role=tab]')) {
+  tab.onclick = () => show(tab.id.slice(4));
+  tab.onkeydown = (e) => {
     const step = { ArrowRight: 'nextElementSibling', ArrowLeft: 'previousElementSibling' }[e.key];
-    if (step && button[step]) { button[step].focus(); button[step].click(); }
+    if (step && tab[step]) { tab[step].focus(); tab[step].click(); }
   };
 }
 $('now').onclick = () => goTo(null);
 $('play').onclick = play;
-$('time').oninput = () => { const [a, b] = span(); goTo(a + ((b - a) * $('time').value) / 1000); };
-$('search').onchange = () => { const found = graph.find($('search').value); if (found) go(found.id); else say(`there is no node ${$('search').value}`, true); };
+$('time').oninput = () => goTo(Number($('time').value));
+function search() {
+  const found = graph.search($('search').value);
+  $('found').textContent = $('search').value ? `${found.length} found` : '';
+  return found;
+}
+$('search').oninput = search;
+$('search').onchange = () => { const [first] = search(); if (first) go(first.id); };
+showChoices($('layers'), LAYERS.map(([layer, of]) => [layer, of, layer]), map.hidden);
+const wide = matchMedia('(min-width: 701px)').matches;
+for (const each of document.querySelectorAll('.choices, #agenda')) each.open = wide;
+$('agenda').ontoggle = () => strip.draw();
 document.addEventListener('keydown', (e) => {
-  if (e.target.matches('input, textarea') || e.ctrlKey || e.metaKey || e.altKey) return;
+  if (e.target.matches('input:not([type=checkbox]):not([type=range]), textarea, select') || e.ctrlKey || e.metaKey || e.altKey) return;
   const key = e.key.toLowerCase();
   if (key === '/') { show('graph'); $('search').focus(); } else if (key === 'n') goTo(null);
-  else if (key === ' ' && !e.target.matches('button')) play();
-  else if (['1', '2', '3', '4'].includes(key)) show(['graph', 'map', 'mission', 'agents'][key - 1]);
+  else if (key === ' ' && !e.target.matches('button, input, summary')) play();
+  else if (['1', '2', '3', '4'].includes(key)) show(TABS[key - 1]);
   else return;
   e.preventDefault();
 });
-begin().catch((error) => say(error.message, true));
+begin().catch(failed);

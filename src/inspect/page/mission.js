@@ -1,93 +1,98 @@
 // Missions, what is to take place when, and processes: as text, for everybody to read.
 
+import { ago, button, clock, element, renew, table } from './element.js';
+import { activityForm } from './forms.js';
 import { usageColour } from './map.js';
-
-export function element(tag, text, attributes = {}) {
-  const made = document.createElement(tag);
-  if (text !== undefined && text !== null) made.textContent = text;
-  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
-  return made;
-}
-
-export function table(headings, rows) {
-  const made = element('table');
-  const head = made.createTHead().insertRow();
-  for (const heading of headings) head.append(element('th', heading, { scope: 'col' }));
-  const body = made.createTBody();
-  for (const row of rows) {
-    const line = body.insertRow();
-    for (const cell of row) {
-      const place = line.insertCell();
-      if (typeof cell === 'number') { place.className = 'number'; place.textContent = String(cell); } else place.append(cell ?? '');
-    }
-  }
-  return made;
-}
 
 const binding = (step) => Object.entries(step.binding).map(([variable, node]) => `${variable}=${node}`).join(', ');
 
-export function missions(place, list, agenda, map, now, { why, ask }) {
-  place.replaceChildren();
-  if (!list.length) place.append(element('p', 'There are no missions.'));
-  for (const mission of list) {
-    const title = element('h2', `${mission.name}: ${mission.status}`);
-    const buttons = [element('button', 'why')];
-    buttons[0].onclick = () => why(mission.name);
-    if (ask) {
-      for (const request of ['pause', 'resume', 'cancel']) {
-        const button = element('button', request);
-        button.onclick = () => ask({ kind: 'request', mission: mission.name, request });
-        buttons.push(button);
-      }
+// `page` says why something is, goes to a time, and changes something where that is allowed.
+export function missions(place, list, agenda, map, now, page) {
+  const parts = [];
+  if (!list.length) parts.push(element('p', 'There are no missions.'));
+  for (const mission of list) parts.push(...missionParts(mission, page));
+  if (agenda?.activities.length) parts.push(element('h2', 'What takes place when'), agendaTable(agenda, map, now, page));
+  renew(place, ...parts);
+}
+
+function missionParts(mission, page) {
+  const title = element('h2', `${mission.name}: ${mission.status}`);
+  title.append(' ', whyButton(mission.name, page));
+  const said = element('span', null, { role: 'status', class: 'bad' });
+  if (page.edit) {
+    for (const request of ['pause', 'resume', 'cancel']) {
+      const ask = () => page.edit({ kind: 'request', mission: mission.name, request }).catch((error) => { said.textContent = ` ${error.message}`; });
+      title.append(' ', button(request, ask, { label: `${request} ${mission.name}` }));
     }
-    title.append(' ', ...buttons);
-    place.append(title);
-    const facts = [mission.reason, `priority ${mission.priority}`, `replanned ${mission.replans} times`];
-    place.append(element('p', facts.filter(Boolean).join('; '), { class: 'soft' }));
-    const steps = element('ol', null, { class: 'steps', 'aria-label': `Plan of ${mission.name}` });
-    for (const step of mission.steps) {
-      const line = element('li', null, { class: step.status });
-      line.append(element('span', step.rule, { class: 'rule' }), `(${binding(step)}) by ${step.agent}: `, element('b', step.status));
-      if (step.reason) line.append(element('span', ` ${step.reason}`, { class: 'soft' }));
-      const button = element('button', 'why');
-      button.onclick = () => why(step.name);
-      line.append(' ', button);
-      steps.append(line);
-    }
-    place.append(steps);
-    const decisions = element('ul');
-    for (const { time, what, why: reason, cause } of mission.decisions) {
-      const since = cause ? `, since version ${cause.version} by ${cause.agent} ${cause.rules.join(', ')}` : '';
-      decisions.append(element('li', `${clock(time)} ${what}${reason ? `: ${reason}` : ''}${since}`));
-    }
-    if (mission.decisions.length) place.append(element('h3', 'What was decided'), decisions);
   }
-  if (agenda?.length) place.append(element('h2', 'What takes place when'), agendaTable(agenda, map, now));
+  title.append(said);
+  const facts = [mission.reason, `priority ${mission.priority}`, `replanned ${mission.replans} times`, mission.deadline && `to be done by ${clock(mission.deadline)}`];
+  const steps = element('ol', null, { class: 'steps', 'aria-label': `Plan of ${mission.name}` });
+  for (const step of mission.steps) {
+    const line = element('li', null, { class: step.status });
+    if (['running', 'dispatched'].includes(step.status)) line.setAttribute('aria-current', 'step');
+    line.append(element('span', step.rule, { class: 'rule' }), `(${binding(step)}) by ${step.agent}: `, element('b', step.status));
+    const since = step.status === 'pending' ? '' : ` since ${clock(step.since)}`;
+    line.append(element('span', `${since}${step.reason ? `: ${step.reason}` : ''} `, { class: 'soft' }), whyButton(step.name, page));
+    steps.append(line);
+  }
+  const parts = [title, element('p', facts.filter(Boolean).join('; '), { class: 'soft' }), steps];
+  if (mission.decisions.length) {
+    const decisions = element('ol', null, { 'aria-label': `What was decided about ${mission.name}` });
+    for (const { time, what, why, cause } of mission.decisions) {
+      const line = element('li', `${clock(time)} ${what}${why ? `: ${why}` : ''}`);
+      if (cause) {
+        line.append(', since ', button(`version ${cause.version}`, () => page.goTo(cause.time), { link: true, key: `${mission.name} ${time} ${cause.version}`, title: 'Go there' }));
+        line.append(` by ${cause.agent} `, element('span', cause.rules.join(', '), { class: 'rule' }));
+      }
+      decisions.append(line);
+    }
+    parts.push(element('h3', 'What was decided'), decisions);
+  }
+  const goal = element('details');
+  goal.append(element('summary', 'Goal'), element('pre', mission.goal));
+  parts.push(goal);
+  return parts;
 }
 
-function agendaTable(agenda, map, now) {
+const whyButton = (path, page) => button('why', () => page.why(path), { label: `Why ${path}` });
+
+function agendaTable(agenda, map, now, page) {
   const usage = new Map((map?.objects ?? []).map((object) => [object.name, object.usage]));
-  return table(['activity', 'at', 'from', 'to', '', 'R(t)'], agenda.map((row) => {
-    const state = row.cancelled ? 'cancelled' : now < row.start ? `in ${minutes(row.start - now)}` : now > row.end ? 'over' : 'now';
-    const cell = element('span', usage.get(row.object)?.toFixed(2) ?? '');
-    cell.style.color = usageColour(usage.get(row.object));
-    return [row.name, row.object ?? '', clock(row.start), clock(row.end), state, cell];
-  }));
+  const place = element('div');
+  const rows = agenda.activities.map((row) => {
+    const state = row.cancelled ? 'cancelled' : now < row.start ? `in ${ago(row.start - now)}` : now > row.end ? 'over' : 'now';
+    const cells = element('span', null, { class: 'tight' });
+    for (const object of row.objects) {
+      const swatch = element('span', null, { class: 'swatch' });
+      swatch.style.background = usageColour(usage.get(object));
+      cells.append(swatch, ` ${object} ${usage.get(object)?.toFixed(2) ?? 'not seen'} `);
+    }
+    const buttons = element('span');
+    buttons.append(whyButton(row.name, page));
+    if (page.edit) buttons.append(' ', button('change', () => { page.changes(row); }, { label: `Change ${row.name}` }));
+    return [row.name, cells, clock(row.start).slice(0, 8), clock(row.end).slice(0, 8), state, buttons];
+  });
+  place.append(table(['activity', 'at, with R(t)', 'from', 'to', '', ''], rows, 'Agenda'));
+  return place;
 }
 
-const minutes = (seconds) => `${Math.max(1, Math.round(seconds / 60))} min`;
-
-export function clock(seconds) {
-  if (seconds === null || seconds === undefined) return '';
-  return new Date(seconds * 1000).toISOString().slice(11, 21);
+// The form that changes an activity, in its place beside the other forms.
+export function changeActivity(place, activity, edit) {
+  const leave = () => { place.replaceChildren(); document.querySelector(`[data-key="Change ${CSS.escape(activity.name)}"]`)?.focus(); };
+  place.replaceChildren(activityForm(activity, edit, leave));
+  place.querySelector('input').focus();
 }
 
-export function agents(place, processes, rates) {
-  place.replaceChildren(element('h2', 'Processes'));
-  if (!processes) { place.append(element('p', 'A recording has no processes.')); return; }
-  place.append(table(['name', 'state', 'restarts', 'load / %', 'memory / MB', 'commits / s', 'last commit', 'process'], processes.map((one) => {
-    const rate = rates.get(one.name);
-    return [one.name, one.state, one.restarts, one.load === null ? '' : Math.round(1000 * one.load) / 10,
-      Math.round(one.memory / 1e5) / 10, rate ? Math.round(10 * rate.rate) / 10 : 0, rate ? clock(rate.time) : '', one.id];
-  })));
+export function agents(place, processes, rates, now) {
+  const parts = [element('h2', 'Processes')];
+  if (!processes) parts.push(element('p', 'A recording has no processes.'));
+  else {
+    parts.push(table(['name', 'state', 'restarts', 'load / %', 'memory / MB', 'commits / s', 'last commit', 'process'], processes.map((one) => {
+      const rate = rates.get(one.name);
+      return [one.name, one.state, one.restarts, one.load === null ? '' : Math.round(1000 * one.load) / 10,
+        Math.round(one.memory / 1e5) / 10, rate ? Math.round(10 * rate.rate) / 10 : 0, rate ? `${ago(Math.max(0, now - rate.time))} ago` : '', one.id];
+    }), 'Processes'));
+  }
+  renew(place, ...parts);
 }

@@ -3,7 +3,7 @@
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 
-const FILES: [(&str, &str, &str); 7] = [
+const FILES: [(&str, &str, &str); 12] = [
     (
         "index.html",
         "text/html; charset=utf-8",
@@ -15,8 +15,13 @@ const FILES: [(&str, &str, &str); 7] = [
         include_str!("style.css"),
     ),
     ("main.js", SCRIPT, include_str!("main.js")),
+    ("agenda.js", SCRIPT, include_str!("agenda.js")),
     ("canvas.js", SCRIPT, include_str!("canvas.js")),
+    ("details.js", SCRIPT, include_str!("details.js")),
+    ("element.js", SCRIPT, include_str!("element.js")),
+    ("forms.js", SCRIPT, include_str!("forms.js")),
     ("graph.js", SCRIPT, include_str!("graph.js")),
+    ("log.js", SCRIPT, include_str!("log.js")),
     ("map.js", SCRIPT, include_str!("map.js")),
     ("mission.js", SCRIPT, include_str!("mission.js")),
 ];
@@ -43,6 +48,51 @@ pub(super) fn file(name: &str) -> Response {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The luminance of a colour `#rrggbb`, as the guidelines of accessible content have it (WCAG 2.2).
+    fn luminance(colour: &str) -> f64 {
+        let part = |at: usize| {
+            let share = f64::from(u8::from_str_radix(&colour[at..at + 2], 16).unwrap()) / 255.0;
+            if share <= 0.04045 {
+                share / 12.92
+            } else {
+                ((share + 0.055) / 1.055).powf(2.4)
+            }
+        };
+        0.2126 * part(1) + 0.7152 * part(3) + 0.0722 * part(5)
+    }
+
+    fn contrast(one: &str, other: &str) -> f64 {
+        let [one, other] = [one, other].map(|colour| luminance(colour) + 0.05);
+        one.max(other) / one.min(other)
+    }
+
+    #[test]
+    fn words_can_be_read_by_light_and_by_dark() {
+        let (_, _, style) = FILES
+            .iter()
+            .find(|(name, ..)| *name == "style.css")
+            .unwrap();
+        let themes: Vec<&str> = style
+            .lines()
+            .filter(|line| line.contains(":root {"))
+            .collect();
+        assert_eq!(themes.len(), 2);
+        for theme in themes {
+            let colour = |name: &str| {
+                let at = theme.find(&format!("--{name}: ")).unwrap() + name.len() + 4;
+                &theme[at..at + 7]
+            };
+            for word in ["ink", "soft", "mark", "bad", "good"] {
+                let contrast = contrast(colour(word), colour("paper"));
+                assert!(contrast >= 4.5, "{word}: {contrast:.2}");
+            }
+            let chosen = contrast(colour("on-mark"), colour("mark"));
+            assert!(chosen >= 4.5, "{chosen:.2}");
+            // What borders a field need not be read.
+            assert!(contrast(colour("edge"), colour("paper")) >= 3.0);
+        }
+    }
 
     #[test]
     fn nothing_is_loaded_from_elsewhere_and_every_import_is_there() {
