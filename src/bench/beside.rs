@@ -16,13 +16,13 @@ const UNDER_WAY: u64 = 100;
 
 /// Commits for a while: how long they took, and how many they were.
 #[derive(Debug, Default)]
-struct Taken {
+pub(super) struct Taken {
     nanoseconds: u128,
-    commits: u64,
+    pub(super) commits: u64,
 }
 
 impl Taken {
-    fn go_on(&mut self, session: &mut Session) -> Result<(), Failure> {
+    pub(super) fn go_on(&mut self, session: &mut Session) -> Result<(), Failure> {
         let start = Instant::now();
         while start.elapsed() < LOOK {
             let transaction = set(self.commits * 7919, self.commits as f64);
@@ -35,7 +35,7 @@ impl Taken {
     }
 
     /// The mean, in which a single long pause shows, in us.
-    fn mean(&self) -> f64 {
+    pub(super) fn mean(&self) -> f64 {
         self.nanoseconds as f64 / 1e3 / self.commits.max(1) as f64
     }
 }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::fs;
 
 /// The names of the graph's figures, in the order in which they are told.
-const ORDER: [&str; 13] = [
+const ORDER: [&str; 16] = [
     "commit_ack_poll",
     "visible_poll",
     "commit_ack_block",
@@ -19,6 +19,9 @@ const ORDER: [&str; 13] = [
     "hot_pose_visible",
     "commit_ack_beside_stopped",
     "commit_ack_beside_killed",
+    "commit_ack_inspected",
+    "inspector_cores",
+    "inspector_first_answer",
 ];
 
 /// One measured quantity.

@@ -17,6 +17,7 @@ mod commits;
 mod figure;
 mod hall;
 mod indoor;
+mod inspector;
 mod path;
 mod peer;
 mod perception;
@@ -101,6 +102,7 @@ pub(crate) fn graph(effort: Effort) -> Result<Vec<Figure>, Failure> {
         commits::flat_out(&hall, effort, raw, &mut figures)?;
         commits::hot(&hall, effort, raw, &mut figures)?;
         beside::all(&hall, effort, &mut figures)?;
+        inspector::commits(&hall, effort, &mut figures)?;
         store.end()?;
     }
     {
@@ -111,6 +113,7 @@ pub(crate) fn graph(effort: Effort) -> Result<Vec<Figure>, Failure> {
     }
     whole::joining(effort, &mut figures)?;
     whole::torn(effort, &mut figures)?;
+    inspector::load(effort, &mut figures)?;
     figure::sort(&mut figures);
     Ok(figures)
 }

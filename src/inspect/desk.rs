@@ -6,11 +6,13 @@ use super::look::{Looker, Source};
 use crate::Failure;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use tokio::sync::{oneshot, watch};
 
-/// The time between two frames at the least.
-const PERIOD: Duration = Duration::from_millis(100);
+/// The time between two frames at the least,
+const PERIOD: Duration = Duration::from_millis(33);
+/// and so many times as long as the last one took, so that a large graph does not take a processor.
+const REST: u32 = 8;
 
 /// What opens the graph, in the thread that looks at it.
 pub(super) type Opener = Box<dyn FnOnce() -> Result<Source, Failure> + Send>;
@@ -80,7 +82,8 @@ fn work(looker: &mut Looker, jobs: &Receiver<Job>, send: &watch::Sender<Arc<str>
             Err(RecvTimeoutError::Disconnected) => return,
             Err(RecvTimeoutError::Timeout) => {}
         }
-        due = next(due);
+        let began = crate::supervise::now();
+        due = (due + PERIOD).max(began);
         // The desk itself holds one.
         if send.receiver_count() < 2 {
             frames = None;
@@ -91,12 +94,9 @@ fn work(looker: &mut Looker, jobs: &Receiver<Job>, send: &watch::Sender<Arc<str>
             Ok(None) => {}
             Err(failure) => tracing::debug!("{:?}", failure.into_report()),
         }
+        let taken = crate::supervise::now().saturating_duration_since(began);
+        due = due.max(began + REST * taken);
     }
-}
-
-fn next(due: Instant) -> Instant {
-    let now = crate::supervise::now();
-    (due + PERIOD).max(now)
 }
 
 fn tell(looker: &mut Looker, frames: &mut Option<Frames>) -> Result<Option<Arc<str>>, Failure> {

@@ -1,4 +1,4 @@
-//! What the page is told as things happen: a frame a tenth of a second at the most. It guarantees that a
+//! What the page is told as things happen: at most one frame in 33 ms. It guarantees that a
 //! frame holds only what changed since the one before, and that who comes in between can ask for the
 //! rest.
 
@@ -12,7 +12,7 @@ use crate::view::mission::missions;
 use serde_json::{Value as Json, json};
 
 /// Frames between two looks at the processes.
-const PROCESSES_EVERY: u64 = 10;
+const PROCESSES_EVERY: u64 = 30;
 
 /// Puts frames together.
 pub(super) struct Frames {

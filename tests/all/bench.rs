@@ -37,6 +37,9 @@ fn the_graphs_figures_are_all_there_and_no_process_or_memory_of_theirs_is_left()
             "hot_pose_visible",
             "commit_ack_beside_stopped",
             "commit_ack_beside_killed",
+            "commit_ack_inspected",
+            "inspector_cores",
+            "inspector_first_answer",
         ]
     );
     for figure in &figures {
@@ -45,6 +48,8 @@ fn the_graphs_figures_are_all_there_and_no_process_or_memory_of_theirs_is_left()
         if name == "torn_reads" {
             assert!(value.abs() < f64::EPSILON, "{value} torn reads");
             assert!(figure["ratio"].is_null());
+        } else if name.as_str().unwrap().starts_with("inspector_") {
+            assert!(value > 0.0, "{figure}");
         } else {
             let [raw, ratio] = ["raw", "ratio"].map(|field| figure[field].as_f64().unwrap());
             assert!(value > 0.0 && raw > 0.0, "{figure}");

@@ -16,9 +16,12 @@ export class GraphView {
     this.lit = new Map();
     this.selected = null;
     this.matches = new Set();
+    this.picture = document.createElement('canvas');
+    this.revision = 0;
   }
 
   set(graph) {
+    this.revision += 1;
     this.types = graph.types;
     this.labels = graph.labels;
     this.nodes = new Map(graph.nodes.map(([id, name, type, x, y]) => [id, { id, name, type: graph.types[type], x, y }]));
@@ -42,7 +45,25 @@ export class GraphView {
 
   shown(node) { return node && !this.hidden.has(node.type); }
 
-  draw(pen, scale, [x0, y0, x1, y1]) {
+  // What stands still is drawn once and kept as a picture: what lights up fades upon it.
+  draw(pen, scale, box) {
+    const { width, height } = pen.canvas;
+    const key = [scale, ...box, width, height, this.selected, this.revision, ...this.hidden, ink('--ink')].join(' ');
+    if (key !== this.key) {
+      this.key = key;
+      [this.picture.width, this.picture.height] = [width, height];
+      const still = this.picture.getContext('2d');
+      still.setTransform(pen.getTransform());
+      this.drawStill(still, scale, box);
+    }
+    pen.save();
+    pen.resetTransform();
+    pen.drawImage(this.picture, 0, 0);
+    pen.restore();
+    this.drawLit(pen, scale, Math.max(6, 2.5 / scale));
+  }
+
+  drawStill(pen, scale, [x0, y0, x1, y1]) {
     const inside = (n) => n.x > x0 - 60 && n.x < x1 + 60 && n.y > y0 - 60 && n.y < y1 + 60;
     pen.lineWidth = 1 / scale;
     // One path for all that look the same: thousands of edges in one stroke.
@@ -72,7 +93,6 @@ export class GraphView {
       pen.fill();
     }
     this.drawMatches(pen, scale, r);
-    this.drawLit(pen, scale, r);
     const chosen = this.nodes.get(this.selected);
     if (this.shown(chosen)) {
       pen.beginPath();
@@ -140,6 +160,7 @@ export class GraphView {
     const part = text.trim().toLowerCase();
     const all = part ? [...this.nodes.values()].filter((node) => node.name.toLowerCase().includes(part)) : [];
     all.sort((a, b) => (b.name.toLowerCase() === part) - (a.name.toLowerCase() === part));
+    this.revision += 1;
     this.matches = new Set(all.map((node) => node.id));
     this.board.redraw();
     return all;
