@@ -76,7 +76,7 @@ impl Inspector {
     fn listen(&self) -> Result<Page, Failure> {
         let mut stream = self.ask("/api/events")?;
         let reading = stream.try_clone().map_err(Failure::internal)?;
-        let mut buffer = [0; 1 << 16];
+        let mut buffer = vec![0; 1 << 16];
         let mut heard = Vec::new();
         while !heard.windows(6).any(|bytes| bytes == b"data: ") {
             match stream.read(&mut buffer).map_err(Failure::internal)? {

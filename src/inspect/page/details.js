@@ -9,6 +9,7 @@ export class Details {
     [this.place, this.ask, this.page] = [place, ask, page];
     this.chosen = null;
     this.shows = null; // 'node', 'why' or 'history'
+    this.turn = 0; // what was asked for last is what is shown, whichever answer comes last
     this.head = element('div');
     this.form = element('div');
   }
@@ -24,14 +25,11 @@ export class Details {
 
   failed(error) { renew(this.place, element('p', error.message, { class: 'bad', role: 'alert' }), this.back()); }
 
-  back() { return button('back', () => (this.chosen === null ? this.place.replaceChildren() : this.node())); }
+  back() { return button('back', () => (this.chosen === null ? this.place.replaceChildren() : this.node()), { label: 'Back to what is chosen' }); }
 
   async node() {
-    const id = this.chosen;
-    let node;
-    try { node = await this.ask('node', { id }); } catch (error) { this.failed(error); return; }
-    if (id !== this.chosen) return;
-    this.shows = 'node';
+    const node = await this.answer('node', 'node', { id: this.chosen });
+    if (!node) return;
     const title = element('h2', node.name);
     title.append(' ', element('span', node.type, { class: 'soft' }), ' ', this.why(node.name), ' ', this.past(node.name));
     const rows = node.attributes.map((one) => {
@@ -60,26 +58,37 @@ export class Details {
 
   past(path) { return button('history', () => this.showHistory(path), { label: `History of ${path}` }); }
 
-  async showWhy(path) {
+  // What the program says to a question; nothing where it refuses, which is shown, or where something else was
+  // asked for meanwhile.
+  async answer(shows, what, question) {
+    this.shows = shows;
+    this.turn += 1;
+    const turn = this.turn;
     try {
-      const { text } = await this.ask('why', { path });
-      this.shows = 'why';
-      renew(this.place, element('h2', `Why ${path}`), element('pre', text, { tabindex: '0' }), this.back());
-      this.place.parentElement.focus({ preventScroll: true });
-      this.place.parentElement.scrollTop = 0;
-    } catch (error) { this.shows = 'why'; this.failed(error); }
+      const told = await this.ask(what, question);
+      return turn === this.turn ? told : null;
+    } catch (error) {
+      if (turn === this.turn) this.failed(error);
+      return null;
+    }
+  }
+
+  async showWhy(path) {
+    const told = await this.answer('why', 'why', { path });
+    if (!told) return;
+    renew(this.place, element('h2', `Why ${path}`), element('pre', told.text, { tabindex: '0' }), this.back());
+    this.place.parentElement.focus({ preventScroll: true });
+    this.place.parentElement.scrollTop = 0;
   }
 
   async showHistory(path) {
-    try {
-      const { entries } = await this.ask('history', { path });
-      this.shows = 'history';
-      const rows = entries.map((entry) => {
-        const then = button(clock(entry.time), () => this.page.goTo(entry.time), { label: `Go to ${clock(entry.time)}`, link: true });
-        return [then, entry.agent, (entry.rules ?? []).join(', '), entry.text ?? JSON.stringify(entry.value)];
-      });
-      renew(this.place, element('h2', `History of ${path}`), table(['time', 'by', 'rule', 'value'], rows, `History of ${path}`), this.back());
-      this.place.parentElement.scrollTop = 0;
-    } catch (error) { this.shows = 'history'; this.failed(error); }
+    const told = await this.answer('history', 'history', { path });
+    if (!told) return;
+    const rows = told.entries.map((entry) => {
+      const then = button(clock(entry.time), () => this.page.goTo(entry.time), { label: `Go to ${clock(entry.time)}`, link: true });
+      return [then, entry.agent, (entry.rules ?? []).join(', '), entry.text ?? JSON.stringify(entry.value)];
+    });
+    renew(this.place, element('h2', `History of ${path}`), table(['time', 'by', 'rule', 'value'], rows, `History of ${path}`), this.back());
+    this.place.parentElement.scrollTop = 0;
   }
 }

@@ -244,13 +244,13 @@ fn an_attribute_is_set_and_why_and_history_tell_of_it() {
     );
     browser.click("[data-key='Why robot.max_speed']");
     browser.until("document.querySelector('#selected pre')?.innerText.includes('by inspector')");
-    browser.click("[data-key='back']");
+    browser.click("[data-key='Back to what is chosen']");
     browser.until("document.querySelector('[data-key=\"History of robot.max_speed\"]')");
     browser.click("[data-key='History of robot.max_speed']");
-    browser.until("document.querySelectorAll('#selected tbody tr').length === 2");
+    browser.until("document.querySelectorAll('#selected table[aria-label^=\"History of\"] tbody tr').length === 2");
     // The log of commits: why is a click on what was touched.
     browser.click("#log li:last-child button:nth-of-type(2)");
-    browser.until("document.querySelector('#selected h2').innerText.startsWith('Why ')");
+    browser.until("document.querySelector('#selected h2')?.innerText.startsWith('Why ')");
     browser.close();
 }
 
