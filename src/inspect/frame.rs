@@ -56,7 +56,7 @@ impl Frames {
             "count": news.count,
         });
         if look {
-            frame["processes"] = self.processes.look();
+            frame["processes"] = self.processes.look(&snapshot);
         }
         if let Some(laser) = laser {
             frame["laser"] = laser;

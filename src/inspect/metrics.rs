@@ -22,7 +22,7 @@ pub(super) fn metrics(looker: &mut Looker) -> Result<String, Failure> {
     let time = snapshot.time().seconds();
     alone("cortex_time_seconds", "gauge", "Time of the graph", time);
     if let Source::Live(session) = &looker.source {
-        let processes = Processes::of(session.instance()).look();
+        let processes = Processes::of(session.instance()).look(&snapshot);
         let each = |key: &str| -> Vec<(String, f64)> {
             let rows = processes.as_array().into_iter().flatten();
             // A JSON text is quoted and escaped as a label is.

@@ -9,6 +9,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// The last commits that are told one by one.
 const TOLD: u64 = 40;
+/// Rates are counted over so many commits,
+const COUNTED: usize = 2000;
+/// and over so many seconds.
+const LATELY: f64 = 5.0;
 /// So many commits are looked through for those that somebody asks for.
 const SIFTED: u64 = 50_000;
 /// The nodes that a commit's line names.
@@ -113,6 +117,42 @@ fn look(before: &Snapshot, newest: &Snapshot) -> Result<News, ReadError> {
         earlier = at;
     }
     Ok(news)
+}
+
+/// How often an agent commits, and when it last did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Rate {
+    /// A second.
+    pub(super) commits: f64,
+    /// Seconds since 1970.
+    pub(super) last: f64,
+}
+
+/// The rates of the agents over the last seconds, by name.
+pub(super) fn rates(snapshot: &Snapshot) -> BTreeMap<String, Rate> {
+    let mut counts: BTreeMap<String, (u64, f64)> = BTreeMap::new();
+    let newest = snapshot.time();
+    let mut oldest = newest;
+    for version in (1..=snapshot.version().0).rev().take(COUNTED) {
+        // What is not kept any more ends the count, as does what is long ago.
+        let Ok(at) = snapshot.at(Version(version)) else {
+            break;
+        };
+        if newest.since(at.time()) > LATELY {
+            break;
+        }
+        oldest = at.time();
+        if let Ok(Some(agent)) = at.agent() {
+            let time = at.time().seconds();
+            counts.entry(agent).or_insert((0, time)).0 += 1;
+        }
+    }
+    let passed = newest.since(oldest).max(1.0);
+    let rate = |(agent, (count, last))| {
+        let commits = count as f64 / passed;
+        (agent, Rate { commits, last })
+    };
+    counts.into_iter().map(rate).collect()
 }
 
 /// Which commits are asked for: those that applied rules, those of an agent.
@@ -251,6 +291,28 @@ mod tests {
             ],
             [2, 1, 0]
         );
+    }
+
+    #[test]
+    fn an_agents_rate_is_of_the_last_seconds() {
+        let mut graph = Graph::in_memory(Schema::open());
+        let mut transaction = Transaction::new();
+        transaction.create_node("thing", "cup", vec![]);
+        for tick in 0..=200_u32 {
+            let agent = if tick.is_multiple_of(4) {
+                "slow"
+            } else {
+                "fast"
+            };
+            let time = Time::from_seconds(f64::from(tick) / 10.0);
+            graph.commit(&transaction, agent, time).unwrap();
+            transaction = Transaction::new();
+            transaction.set("cup", "n", f64::from(tick));
+        }
+        let rates = rates(&graph.snapshot());
+        let [slow, fast] = ["slow", "fast"].map(|agent| rates[agent]);
+        assert!((slow.commits - 2.5).abs() < 0.2 && (fast.commits - 7.5).abs() < 0.2);
+        assert!((slow.last - 20.0).abs() < 1e-6 && (fast.last - 19.9).abs() < 1e-6);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 
 mod browser;
 mod page;
+mod terminal;
 
 use crate::support::{Process, Program, TestInstance};
 use dsr::{EdgeRef, Operation, Session, Time, Transaction, Value};
@@ -12,7 +13,7 @@ use std::net::TcpStream;
 use std::process::{Child, Stdio};
 use std::time::Duration;
 
-const PATIENCE: Duration = Duration::from_secs(30);
+const PATIENCE: Duration = Duration::from_secs(20);
 
 /// A store with a room, a robot and people, and the inspector looking at it.
 struct Inspected {

@@ -13,7 +13,7 @@ import { agents, changeActivity, missions } from './mission.js';
 
 const $ = (id) => document.getElementById(id);
 const TABS = ['graph', 'map', 'mission', 'agents'];
-const state = { about: null, at: null, tab: 'graph', playing: null, missions: [], agenda: null, processes: null, rates: new Map(), asked: new Map() };
+const state = { about: null, at: null, tab: 'graph', playing: null, missions: [], agenda: null, processes: null, asked: new Map() };
 const hash = new URLSearchParams(location.hash.slice(1));
 const token = hash.get('token');
 const still = hash.has('still'); // looks once and follows nothing: for pictures
@@ -141,7 +141,7 @@ function go(id) {
 
 function showText() {
   if (state.tab === 'mission') missions($('told'), state.missions, state.agenda, map.map, now(), { ...page, edit: mayEdit() ? edit : null });
-  else if (state.tab === 'agents') agents($('told'), state.processes, state.rates, now());
+  else if (state.tab === 'agents') agents($('told'), state.processes, now());
   $('forms').hidden = state.tab !== 'mission';
 }
 
@@ -235,19 +235,10 @@ function play() {
 
 // What happens.
 
-function count(commit) {
-  const rate = state.rates.get(commit.agent) ?? { count: 0, since: commit.time, rate: 0 };
-  rate.count += 1;
-  rate.time = commit.time;
-  if (commit.time - rate.since > 2) Object.assign(rate, { rate: rate.count / (commit.time - rate.since), count: 0, since: commit.time });
-  state.rates.set(commit.agent, rate);
-}
-
 function tell(frame) {
   if (frame.processes) state.processes = frame.processes;
   state.about.newest = Math.max(state.about.newest, frame.time);
   if (frame.processes && due('about', 5000)) ask('about').then((about) => { state.about.oldest = about.oldest; }, () => {});
-  frame.commits.forEach(count);
   if (frame.missions) state.missions = frame.missions;
   if (state.at !== null) { showClock(); return; }
   log.add(frame.commits);

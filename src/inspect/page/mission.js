@@ -84,14 +84,14 @@ export function changeActivity(place, activity, edit) {
   place.querySelector('input').focus();
 }
 
-export function agents(place, processes, rates, now) {
+export function agents(place, processes, now) {
   const parts = [element('h2', 'Processes')];
   if (!processes) parts.push(element('p', 'A recording has no processes.'));
   else {
     parts.push(table(['name', 'state', 'restarts', 'load / %', 'memory / MB', 'commits / s', 'last commit', 'process'], processes.map((one) => {
-      const rate = rates.get(one.name);
-      return [one.name, one.state, one.restarts, one.load === null ? '' : Math.round(1000 * one.load) / 10,
-        Math.round(one.memory / 1e5) / 10, rate ? Math.round(10 * rate.rate) / 10 : 0, rate ? `${ago(Math.max(0, now - rate.time))} ago` : '', one.id];
+      const tenths = (number) => (number === null ? '' : number.toFixed(1));
+      const cells = [tenths(one.load && 100 * one.load), tenths(one.memory / 1e6), tenths(one.commits)].map((text) => element('span', text, { class: 'number' }));
+      return [one.name, one.state, one.restarts, ...cells, one.last === null ? '' : `${ago(Math.max(0, now - one.last))} ago`, one.id];
     }), 'Processes'));
   }
   renew(place, ...parts);
