@@ -2,7 +2,7 @@
 //! nobody who commits takes any longer for it: the store does not know of who looks.
 
 use crate::commands::graph::name_of;
-use dsr::{ReadError, Snapshot, Version};
+use dsr::{EdgeKey, NodeId, ReadError, Snapshot, Version};
 use executive::Cause;
 use serde_json::{Value as Json, json};
 use std::collections::{BTreeMap, BTreeSet};
@@ -15,6 +15,8 @@ const COUNTED: usize = 2000;
 const LATELY: f64 = 5.0;
 /// So many commits are looked through for those that somebody asks for.
 const SIFTED: u64 = 50_000;
+/// So many edges of a node are looked through for those that a commit of long ago wrote.
+const EDGES: usize = 500;
 /// The nodes that a commit's line names.
 const NAMED: usize = 4;
 
@@ -96,12 +98,7 @@ fn look(before: &Snapshot, newest: &Snapshot) -> Result<News, ReadError> {
             let key = edge.key();
             news.changed.insert(key.to.0);
             news.structure |= before.find_edge(key)?.is_none();
-            let label = newest.schema().label_name(key.label);
-            let [from, to] = [id, key.to].map(|id| name_of(newest, id));
-            edges
-                .entry(version)
-                .or_default()
-                .insert(format!("{from}-{label}->{to}"));
+            edges.entry(version).or_default().insert(path(newest, key));
         }
     }
     let first = newest
@@ -109,11 +106,12 @@ fn look(before: &Snapshot, newest: &Snapshot) -> Result<News, ReadError> {
         .0
         .saturating_sub(TOLD)
         .max(before.version().0);
+    let none = BTreeSet::new();
     let mut earlier = newest.at(Version(first))?;
     for version in first + 1..=newest.version().0 {
         let at = newest.at(Version(version))?;
-        news.commits
-            .extend(line(&earlier, &at, edges.get(&at.version()))?);
+        let written = edges.get(&at.version()).unwrap_or(&none);
+        news.commits.extend(line(&earlier, &at, Some(written))?);
         earlier = at;
     }
     Ok(news)
@@ -185,7 +183,8 @@ pub(super) fn commits(snapshot: &Snapshot, sieve: &Sieve<'_>, count: usize) -> V
     found.flatten().take(count).collect()
 }
 
-/// A commit in a line: by whom, with which rules, and what it touched, the first of it as paths.
+/// A commit in a line: by whom, with which rules, and what it touched, the first of it as paths. The edges that it
+/// wrote are looked up where nobody knows them.
 fn line(
     before: &Snapshot,
     after: &Snapshot,
@@ -203,8 +202,13 @@ fn line(
             Some(_) => drop(others.insert(id)),
         }
     }
+    if edges.is_none() {
+        for id in &others {
+            what.extend(written_edges(after, *id)?);
+        }
+    }
     if what.is_empty() {
-        // Which of their edges, was written over by now.
+        // Which of their edges is not known: it was written over, deleted, or one of very many.
         what.extend(others.iter().map(|id| name_of(after, *id)));
     }
     let more = what.len().saturating_sub(NAMED);
@@ -213,6 +217,27 @@ fn line(
         "version": cause.version.0, "time": cause.time, "agent": cause.agent,
         "rules": cause.rules, "what": what, "more": more,
     })))
+}
+
+/// Paths of the edges from a node that a version wrote, as far as they are among the first.
+fn written_edges(after: &Snapshot, from: NodeId) -> Result<Vec<String>, ReadError> {
+    let Some(node) = after.find_node(from)? else {
+        return Ok(Vec::new());
+    };
+    let mut paths = Vec::new();
+    for edge in node.edges().take(EDGES) {
+        let edge = edge?;
+        if edge.version()? == after.version() {
+            paths.push(path(after, edge.key()));
+        }
+    }
+    Ok(paths)
+}
+
+fn path(snapshot: &Snapshot, key: EdgeKey) -> String {
+    let label = snapshot.schema().label_name(key.label);
+    let [from, to] = [key.from, key.to].map(|id| name_of(snapshot, id));
+    format!("{from}-{label}->{to}")
 }
 
 #[cfg(test)]
@@ -271,7 +296,7 @@ mod tests {
         assert_eq!(news.commits[0]["what"], json!(["ana"]));
         let past = commits(&newest, &Sieve::default(), 2);
         let told: Vec<_> = past.iter().map(|line| &line["what"]).collect();
-        assert_eq!(told, [&json!(["ana"]), &json!(["cup"])]);
+        assert_eq!(told, [&json!(["ana"]), &json!(["cup-in->kitchen"])]);
         let by = |agent, rules| {
             commits(
                 &newest,
