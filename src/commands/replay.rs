@@ -147,6 +147,7 @@ fn tell_verdict(arguments: &Arguments, verdict: &Verdict, is_cut: bool) -> Resul
             "cut": is_cut, "complete": verdict.ended, "commits": verdict.commits,
             "version": verdict.version, "compared": verdict.compared,
             "digests": verdict.digests, "missed": verdict.missed,
+            "ticks": verdict.ticks, "messages": verdict.messages,
             "mismatches": mismatches.collect::<Vec<_>>(),
         }));
     }

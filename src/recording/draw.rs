@@ -2,13 +2,14 @@
 //! has height 0 and that colours stay within [0, 1].
 
 use crate::view::map::{Place, Point};
+use agents::messages::LaserScan;
 use dsr::{Pose, Time};
 use foxglove::messages::line_primitive::Type as Line;
 use foxglove::messages::packed_element_field::NumericType;
 use foxglove::messages::{
-    ArrowPrimitive, Color, CubePrimitive, CylinderPrimitive, FrameTransform, Grid, LinePrimitive,
-    PackedElementField, Point3, Pose as FoxglovePose, PosesInFrame, Quaternion, TextPrimitive,
-    Timestamp, Vector2, Vector3,
+    ArrowPrimitive, Color, CubePrimitive, CylinderPrimitive, FrameTransform, Grid,
+    LaserScan as FoxgloveScan, LinePrimitive, PackedElementField, Point3, Pose as FoxglovePose,
+    PosesInFrame, Quaternion, TextPrimitive, Timestamp, Vector2, Vector3,
 };
 
 /// Red, green, blue and how opaque, each in [0, 1].
@@ -164,6 +165,20 @@ pub(super) fn path(time: Time, frame: &str, points: &[Point]) -> PosesInFrame {
         timestamp: Some(timestamp(time)),
         frame_id: frame.to_owned(),
         poses: poses.collect(),
+    }
+}
+
+/// What the laser at the middle of `robot` measures.
+pub(super) fn scan(scan: &LaserScan, robot: &str) -> FoxgloveScan {
+    let steps = scan.ranges.len().saturating_sub(1) as f64;
+    FoxgloveScan {
+        timestamp: Some(timestamp(scan.time)),
+        frame_id: robot.to_owned(),
+        pose: standing([0.0; 3], 0.0),
+        start_angle: scan.angle_min,
+        end_angle: scan.angle_min + steps * scan.angle_step,
+        ranges: scan.ranges.iter().copied().map(f64::from).collect(),
+        intensities: Vec::new(),
     }
 }
 

@@ -1,13 +1,16 @@
 //! The file of a recording as it is written: channels with their schemas, and chunks that reach the
 //! file whole. It guarantees that what was flushed can be read whatever becomes of the process.
 
-use super::{COMMITS, DIGEST, LOG, MISSIONS, PATH, SCENE, SNAPSHOT, SOCIAL_GRID, TRANSFORMS};
+use super::{
+    CHANNELS, CLOCK, COMMITS, DIGEST, LASER_SCAN, LOG, MISSIONS, PATH, SCENE, SNAPSHOT,
+    SOCIAL_GRID, TRANSFORMS,
+};
 use dsr::Time;
 use foxglove::Encode;
-use foxglove::messages::{FrameTransforms, Grid, Log, PosesInFrame, SceneUpdate};
+use foxglove::messages::{FrameTransforms, Grid, LaserScan, Log, PosesInFrame, SceneUpdate};
 use mcap::records::MessageHeader;
 use mcap::{WriteOptions, Writer};
-use serde_json::Value as Json;
+use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
@@ -40,7 +43,7 @@ pub(crate) enum RecordError {
 }
 
 /// The topics whose messages are JSON, each with the name and the text of its schema.
-const JSON_TOPICS: [(&str, &str, &str); 4] = [
+const JSON_TOPICS: [(&str, &str, &str); 10] = [
     (
         SNAPSHOT,
         "cortex.Snapshot",
@@ -56,6 +59,32 @@ const JSON_TOPICS: [(&str, &str, &str); 4] = [
         MISSIONS,
         "cortex.Missions",
         include_str!("schemas/missions.json"),
+    ),
+    (CLOCK, "cortex.Tick", include_str!("schemas/tick.json")),
+    (
+        CHANNELS[0].1,
+        "cortex.Detections",
+        include_str!("schemas/detections.json"),
+    ),
+    (
+        CHANNELS[1].1,
+        "cortex.Laser",
+        include_str!("schemas/laser.json"),
+    ),
+    (
+        CHANNELS[2].1,
+        "cortex.Odometry",
+        include_str!("schemas/odometry.json"),
+    ),
+    (
+        CHANNELS[3].1,
+        "cortex.Velocity",
+        include_str!("schemas/velocity.json"),
+    ),
+    (
+        CHANNELS[4].1,
+        "cortex.Speech",
+        include_str!("schemas/speech.json"),
     ),
 ];
 
@@ -107,6 +136,7 @@ impl RecordFile {
         self.typed::<SceneUpdate>(SCENE)?;
         self.typed::<Grid>(SOCIAL_GRID)?;
         self.typed::<PosesInFrame>(PATH)?;
+        self.typed::<LaserScan>(LASER_SCAN)?;
         self.typed::<Log>(LOG)
     }
 
@@ -137,10 +167,10 @@ impl RecordFile {
         &mut self,
         topic: &'static str,
         time: Time,
-        message: &Json,
+        message: &impl Serialize,
     ) -> Result<(), RecordError> {
         self.scratch.clear();
-        // Writing JSON values to memory does not fail.
+        // Writing JSON to memory does not fail.
         drop(serde_json::to_writer(&mut self.scratch, message));
         self.write(topic, time)
     }
@@ -208,7 +238,7 @@ impl RecordFile {
 mod tests {
     use super::*;
     use mcap::{MessageStream, Summary};
-    use serde_json::json;
+    use serde_json::{Value as Json, json};
 
     fn written(finish: bool) -> (tempfile::TempDir, Vec<u8>) {
         let folder = tempfile::tempdir().unwrap();
@@ -235,7 +265,7 @@ mod tests {
         let (_folder, bytes) = written(true);
         let summary = Summary::read(&bytes).unwrap().unwrap();
         assert_eq!(summary.stats.unwrap().message_count, 3);
-        assert_eq!(summary.channels.len(), 9);
+        assert_eq!(summary.channels.len(), JSON_TOPICS.len() + 6);
         let mut channels = summary.channels.values();
         let described = |schema: &std::sync::Arc<mcap::Schema<'_>>| !schema.data.is_empty();
         assert!(channels.all(|channel| channel.schema.as_ref().is_some_and(described)));

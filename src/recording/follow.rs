@@ -2,11 +2,14 @@
 //! that every commit is in the file, or that the file says where some are missing and what the graph
 //! was after them; and that what it saw is in the file a second later.
 
+use super::channels::{self, Channels};
 use super::digest::digest;
 use super::draw;
 use super::file::{RecordError, RecordFile};
 use super::scene::Scene;
-use super::{COMMITS, DIGEST, LOG, MISSIONS, PATH, SCENE, SNAPSHOT, SOCIAL_GRID, TRANSFORMS};
+use super::{
+    COMMITS, DIGEST, LASER_SCAN, LOG, MISSIONS, PATH, SCENE, SNAPSHOT, SOCIAL_GRID, TRANSFORMS,
+};
 use crate::seen::Seen;
 use crate::view::map::{Map, Point};
 use crate::view::mission::missions;
@@ -38,6 +41,7 @@ const TOLD: Duration = Duration::from_secs(2);
 pub(crate) struct Recorder {
     file: RecordFile,
     changes: Changes,
+    channels: Channels,
     session: Session,
     /// The version that the recording has come to.
     version: Version,
@@ -66,6 +70,7 @@ impl Recorder {
         let mut recorder = Self {
             file: RecordFile::create(path)?,
             changes,
+            channels: Channels::open(&session)?,
             session,
             version: Version(0),
             since_digest: 0,
@@ -140,6 +145,8 @@ impl Recorder {
     /// # Errors
     /// [`RecordError`].
     pub(crate) fn take(&mut self) -> Result<(), RecordError> {
+        // What was sent stands before the commits that came of it.
+        self.channels.take(&mut self.file)?;
         loop {
             let schema = self.session.snapshot()?.shared_schema().clone();
             match self.changes.next(&schema)? {
@@ -226,6 +233,10 @@ impl Recorder {
                 .message(PATH, time, &draw::path(time, &map.frame, path))?;
             self.shown.path = path.to_vec();
         }
+        if let (Some(scan), Some(robot)) = (self.channels.scan.take(), map.robots.first()) {
+            let scan = draw::scan(&scan, &robot.name);
+            self.file.message(LASER_SCAN, time, &scan)?;
+        }
         if self.shown.missions.as_ref() != Some(&missions) {
             self.file
                 .json(MISSIONS, time, &json!({"missions": missions}))?;
@@ -265,6 +276,8 @@ impl Recorder {
     /// # Errors
     /// [`RecordError`].
     pub(crate) fn finish(mut self) -> Result<(), RecordError> {
+        // What agents send at their end is told by nobody's commit.
+        self.channels.take(&mut self.file)?;
         self.catch_up()?;
         let last = self.session.read(|snapshot| {
             let (graph, sha256) = digest(snapshot)?;
@@ -281,8 +294,9 @@ impl Recorder {
 /// [`RecordError`].
 pub(crate) fn follow(mut recorder: Recorder, mut turns: Turns) -> Result<(), RecordError> {
     if turns.in_lockstep() {
-        while turns.next(&mut recorder.session)?.is_some() {
+        while let Some(tick) = turns.next(&mut recorder.session)? {
             recorder.catch_up()?;
+            channels::tick(&mut recorder.file, tick)?;
         }
     } else {
         while !turns.ended() && recorder.session.instance().exists() {

@@ -5,6 +5,7 @@ use super::digest::digest;
 use super::read::{DigestRow, Item, PlayError, Recording};
 use super::replayed::{CommitRow, RecordedRules};
 use dsr::{Graph, Image, Limits, Schema, Snapshot, Time, Transaction, Version};
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -45,6 +46,9 @@ pub(crate) struct Verdict {
     pub(crate) version: u64,
     pub(crate) compared: u64,
     pub(crate) mismatches: Vec<Mismatch>,
+    /// How many ticks there were, and messages of each channel.
+    pub(crate) ticks: u64,
+    pub(crate) messages: BTreeMap<&'static str, u64>,
     /// Whether the recording was ended, rather than cut off.
     pub(crate) ended: bool,
 }
@@ -87,6 +91,14 @@ impl<T: Target> Player<T> {
             Item::Commit { .. } | Item::Digest(_) if !self.began => Err(PlayError::NoGraph),
             Item::Commit { time, row } => self.commit(*time, row),
             Item::Digest(row) => self.compare(row),
+            Item::Tick => {
+                self.verdict.ticks += 1;
+                Ok(())
+            }
+            Item::Message(channel) => {
+                *self.verdict.messages.entry(channel).or_default() += 1;
+                Ok(())
+            }
         }
     }
 

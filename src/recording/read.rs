@@ -2,7 +2,7 @@
 //! everything up to the cut is given, and that it is said.
 
 use super::replayed::{CommitRow, RowError};
-use super::{COMMITS, DIGEST, SNAPSHOT};
+use super::{CHANNELS, CLOCK, COMMITS, DIGEST, SNAPSHOT};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use dsr::{Image, ReadError, Refusal, Time};
@@ -65,6 +65,9 @@ pub(crate) enum Item {
     },
     /// The digest of the graph as of a version, and whether the recording was ended there.
     Digest(DigestRow),
+    Tick,
+    /// A message of that channel.
+    Message(&'static str),
 }
 
 impl Item {
@@ -73,7 +76,7 @@ impl Item {
         match self {
             Self::Snapshot { image, .. } => Some(image.time()),
             Self::Commit { time, .. } => Some(*time),
-            Self::Digest(_) => None,
+            Self::Digest(_) | Self::Tick | Self::Message(_) => None,
         }
     }
 }
@@ -174,7 +177,11 @@ fn item(message: &Message<'_>) -> Result<Option<Item>, PlayError> {
             Ok(Some(Item::Commit { time, row }))
         }
         DIGEST => Ok(Some(Item::Digest(parse(message).map_err(bad)?))),
-        _ => Ok(None),
+        CLOCK => Ok(Some(Item::Tick)),
+        _ => {
+            let channel = CHANNELS.iter().find(|(_, known)| *known == topic);
+            Ok(channel.map(|(channel, _)| Item::Message(channel)))
+        }
     }
 }
 

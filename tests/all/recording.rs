@@ -50,6 +50,17 @@ fn a_recorded_run_is_looked_at_as_of_any_time_and_played_again_to_the_same_graph
     assert!(verdict["commits"].as_u64().unwrap() > 1000, "{verdict}");
     assert!(verdict["digests"].as_u64().unwrap() > 2, "{verdict}");
 
+    // Of each tick there is what the world measured and what the robot was told.
+    let messages = |channel: &str| verdict["messages"][channel].as_u64().unwrap();
+    let ticks = verdict["ticks"].as_u64().unwrap();
+    assert!(ticks > 100, "{verdict}");
+    // The laser turns and the base is located ten times a second.
+    let half = ticks.div_ceil(2);
+    assert_eq!((messages("odometry"), messages("laser")), (half, half));
+    // And that it shall stand, at the end.
+    assert_eq!(messages("velocity"), ticks + 1);
+    assert!(messages("detections") >= ticks, "{verdict}");
+
     let velocities = history(file, "robot.velocity");
     assert!(velocities.len() > 100, "{}", velocities.len());
     let (end, start) = (velocities[0], velocities[velocities.len() - 1]);

@@ -49,6 +49,14 @@ impl Session {
         })
     }
 
+    /// Every tick from now on, for who must miss none: [`Self::wait_for_tick`] gives the newest.
+    ///
+    /// # Errors
+    /// [`InstanceError`].
+    pub fn ticks(&self) -> Result<Subscriber<Tick>, InstanceError> {
+        Subscriber::open(&self.node, CLOCK)
+    }
+
     /// The newest tick since the last call, waiting up to `patience` for one.
     ///
     /// # Errors
