@@ -4,10 +4,11 @@
 import { button, clock, element } from './element.js';
 
 const KEPT = 80;
+const EVERY = 250; // ms: nobody reads faster
 
 export class Log {
   constructor({ list, ruled, author, held }, page) {
-    Object.assign(this, { list, ruled, author, held, page, waiting: [], over: false, known: new Set() });
+    Object.assign(this, { list, ruled, author, held, page, waiting: [], over: false, timer: null, known: new Set() });
     list.onpointerenter = (e) => { this.over = e.pointerType === 'mouse'; };
     list.onpointerleave = () => { this.over = false; this.flush(); };
     list.addEventListener('focusout', () => setTimeout(() => this.flush()));
@@ -23,6 +24,7 @@ export class Log {
     this.waiting = [];
     this.list.replaceChildren();
     this.add([...commits].reverse());
+    this.flush();
   }
 
   // Adds what came, oldest first.
@@ -34,7 +36,7 @@ export class Log {
     }
     this.waiting.push(...commits.filter((commit) => this.passes(commit)));
     this.waiting.splice(0, this.waiting.length - KEPT);
-    this.flush();
+    this.timer ??= setTimeout(() => { this.timer = null; this.flush(); }, EVERY);
   }
 
   flush() {

@@ -251,8 +251,9 @@ function tell(frame) {
   strip.tick(frame.time);
   if (frame.missions || (frame.processes && state.tab === 'agents') || due('text', 10000)) showText();
   if ((touched.has(details.chosen) || frame.processes) && due('node', 900)) details.again();
-  if (state.tab === 'map') { loadGrid(); describe(); }
+  if (state.tab === 'map') { loadGrid(); if (due('describe', 1000)) describe(); }
   say('live');
+  if (!due('clock', 100)) return;
   $('version').textContent = `, version ${frame.version}`;
   showClock();
 }
