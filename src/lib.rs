@@ -9,6 +9,7 @@ mod commands;
 mod conduct;
 mod excerpt;
 mod inspect;
+mod log;
 mod manifests;
 mod progress;
 mod recording;
@@ -45,9 +46,7 @@ pub fn main() -> ExitCode {
         }
     };
     tracing_subscriber::fmt()
-        .with_env_filter(
-            tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into()),
-        )
+        .with_env_filter(log::filter(&cli.verb))
         .with_writer(std::io::stderr)
         .with_ansi(false)
         .init();
