@@ -300,7 +300,7 @@ pub fn goal(bytes: &[u8]) {
 
 /// A scenario's main file.
 pub fn scenario(bytes: &[u8]) {
-    let nothing = |_: &str| Ok(String::new());
+    let nothing = |_: &str| Ok(Vec::new());
     drop(scenarios::Scenario::parse(
         "scenario.toml",
         &text(bytes),

@@ -196,7 +196,7 @@ object = "screen"
 start = "10:05"
 end = "10:30"
 "#;
-        let read = |_: &str| Ok(String::new());
+        let read = |_: &str| Ok(Vec::new());
         let scenario = Scenario::parse("scenario.toml", text, &read).expect("a good scenario");
         let mut graph = Graph::in_memory(schema().expect("the schema as shipped"));
         graph

@@ -173,7 +173,7 @@ pose = [1.0, 1.0, 0.5]
 "#;
 
     fn scenario(text: &str) -> Scenario {
-        let read = |_: &str| Ok(String::new());
+        let read = |_: &str| Ok(Vec::new());
         Scenario::parse("scenario.toml", text, &read).expect("a good scenario")
     }
 

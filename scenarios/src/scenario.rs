@@ -9,6 +9,7 @@ mod file;
 mod geometry;
 mod load;
 mod missions;
+mod occupancy;
 mod people;
 mod reader;
 mod schedule;
@@ -21,6 +22,7 @@ pub use diagnostic::{Invalid, LoadError, Problem, ProblemKind};
 pub use file::parse_social;
 pub use load::MAIN_FILE;
 pub use missions::{Earlier, MissionFile, Present};
+pub use occupancy::MapError;
 pub use schedule::parse_schedule;
 #[cfg(test)]
 pub(crate) use space::CLASSES;
@@ -54,7 +56,7 @@ pub struct Scenario {
     pub rooms: Vec<Room>,
     /// The passages between rooms.
     pub doors: Vec<Door>,
-    /// Outlines of rooms less the doors, and the walls given one by one.
+    /// Outlines of rooms less the doors, the walls given one by one, and those around what the map shows.
     pub walls: Vec<Wall>,
     /// Named poses to go to.
     pub places: Vec<Place>,
@@ -91,6 +93,16 @@ pub struct Room {
     pub polygon: Vec<Point2<f64>>,
     /// Whether the outline is a wall (but for the doors).
     pub walled: bool,
+}
+
+/// What the unknown cells of an occupancy map are.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Unknown {
+    /// As solid as what is occupied.
+    #[default]
+    Blocked,
+    /// As free as what is known to be.
+    Free,
 }
 
 /// A passage between two rooms.

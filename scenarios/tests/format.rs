@@ -13,7 +13,7 @@ fn example() -> &'static str {
 }
 
 fn parse(text: &str) -> Result<Scenario, String> {
-    Scenario::parse("README.md", text, &|_| Ok(String::new()))
+    Scenario::parse("README.md", text, &|_| Ok(Vec::new()))
         .map_err(|invalid| format!("{:?}", miette::Report::new(*invalid)))
 }
 

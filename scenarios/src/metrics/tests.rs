@@ -227,8 +227,7 @@ end = "11:30"
 name = "visit"
 goal = "visit.aggt"
 "#;
-    let scenario =
-        Scenario::parse("scenario.toml", text, &|_| Ok(String::new())).expect("is sound");
+    let scenario = Scenario::parse("scenario.toml", text, &|_| Ok(Vec::new())).expect("is sound");
     let spaces = object_spaces(&scenario, &SocialConfig::default()).expect("makes a map");
     let [screen] = &spaces[..] else {
         panic!("a plant has no space: {spaces:?}")

@@ -45,7 +45,7 @@ goal = "visit.aggt"
 "#;
 
 fn hall() -> Scenario {
-    Scenario::parse("scenario.toml", HALL, &|_| Ok(String::new())).expect("is sound")
+    Scenario::parse("scenario.toml", HALL, &|_| Ok(Vec::new())).expect("is sound")
 }
 
 /// From west to east in half a minute at `y`, into something at 15 s, past `people` who walk north.

@@ -1,6 +1,7 @@
 //! What can be wrong with a scenario. Every problem carries the bytes it is about, so that the
 //! report underlines them; all problems of a file come in one report.
 
+use super::occupancy::MapError;
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceSpan};
 use std::fmt;
 use std::path::PathBuf;
@@ -250,6 +251,14 @@ pub enum ProblemKind {
         text: String,
         /// What it must be.
         expected: &'static str,
+    },
+    /// An occupancy map that cannot be used.
+    #[error("map `{path}`: {error}")]
+    Map {
+        /// As written.
+        path: String,
+        /// What is wrong with it.
+        error: MapError,
     },
     /// A file that the scenario names and that cannot be read.
     #[error("cannot read `{path}`: {reason}")]

@@ -19,8 +19,8 @@ use std::path::PathBuf;
 use toml::Spanned;
 use toml::de::DeTable;
 
-/// Gives the text of a file beside the main one.
-pub(super) type Read<'a> = &'a dyn Fn(&str) -> std::io::Result<String>;
+/// Gives what is in a file beside the main one.
+pub(super) type Read<'a> = &'a dyn Fn(&str) -> std::io::Result<Vec<u8>>;
 
 /// A file beside the main one.
 pub(super) struct Beside {
@@ -242,7 +242,7 @@ fn whole(table: &Table<'_>, text: &str, read: Read<'_>) -> Scenario {
     let duration = table.required_number("duration", Bound::Positive);
     let rooms = space::rooms(table, &mut names);
     let doors = space::doors(table, &names, &rooms);
-    let walls = space::walls(table, &rooms, &doors);
+    let walls = space::walls(table, &rooms, &doors, read);
     let bounds = space::bounds(table, &rooms);
     let places = space::places(table, &mut names, &rooms);
     let objects = space::objects(table, &mut names, &rooms);
@@ -305,7 +305,9 @@ pub(super) fn file(table: &Table<'_>, key: &'static str, default: &str, read: Re
     let path = table
         .get::<String>(key)
         .map_or_else(|| default.to_owned(), |path| path.value);
-    read(&path).unwrap_or_else(|error| {
+    let text =
+        read(&path).and_then(|bytes| String::from_utf8(bytes).map_err(std::io::Error::other));
+    text.unwrap_or_else(|error| {
         let kind = ProblemKind::UnreadableFile {
             path,
             reason: error.to_string(),

@@ -20,13 +20,13 @@ impl Scenario {
             path: path.clone(),
             source,
         })?;
-        let read = |name: &str| std::fs::read_to_string(folder.join(name));
+        let read = |name: &str| std::fs::read(folder.join(name));
         let mut scenario = Self::parse(&path.display().to_string(), &text, &read)?;
         scenario.folder = folder.to_path_buf();
         Ok(scenario)
     }
 
-    /// Reads a scenario from the `text` of its main file; `read` gives the text of the files that it
+    /// Reads a scenario from the `text` of its main file; `read` gives what is in the files that it
     /// names, `file` is how diagnostics call the main file.
     ///
     /// # Errors
@@ -34,7 +34,7 @@ impl Scenario {
     pub fn parse(
         file: &str,
         text: &str,
-        read: &dyn Fn(&str) -> std::io::Result<String>,
+        read: &dyn Fn(&str) -> std::io::Result<Vec<u8>>,
     ) -> Result<Self, Box<Invalid>> {
         let (mut scenario, schedule) = file::scenario(text, read)
             .map_err(|problems| Box::new(Invalid::new(file, text, problems)))?;

@@ -56,13 +56,13 @@ impl MissionFile {
     /// `goal` (a file) and, where they are wanted, `priority`, `preemption`, `at` (a time of day, the next
     /// one after that of `present`; days begin at midnight of the instance's clock), `every` ("hour", "day", "week" or
     /// seconds), `within` (seconds from its beginning until it fails) and `after` (the name of a mission
-    /// that must have succeeded: of the file, or one that is present). `read` gives the text of the files that it
+    /// that must have succeeded: of the file, or one that is present). `read` gives what is in the files that it
     /// names, `file` is how diagnostics call it.
     pub fn parse(
         file: &str,
         text: &str,
         present: Present<'_>,
-        read: &dyn Fn(&str) -> std::io::Result<String>,
+        read: &dyn Fn(&str) -> std::io::Result<Vec<u8>>,
     ) -> (Self, Option<Box<Invalid>>) {
         let invalid = |problems: Vec<Problem>| Box::new(Invalid::new(file, text, problems));
         let document = match document(text) {
@@ -252,7 +252,7 @@ goal = "call.aggt"
             earlier("meal", Some("was cancelled")),
         ];
         let read = |path: &str| match path {
-            "rules.aggl" | "call.aggt" => Ok(path.to_owned()),
+            "rules.aggl" | "call.aggt" => Ok(path.as_bytes().to_vec()),
             _ => Err(std::io::Error::from(std::io::ErrorKind::NotFound)),
         };
         let present = Present {

@@ -1,10 +1,11 @@
 //! The part of the main file that stands still: rooms, doors, walls, places, objects.
 
 use super::diagnostic::ProblemKind;
+use super::file::Read;
 use super::file::{Kind, Names, point, pose};
 use super::geometry::{self, Fit, distance_to_wall};
 use super::reader::{Bound, Located, Problems, Table};
-use super::{Door, Object, Place, Room, Shape, Wall};
+use super::{Door, Object, Place, Room, Shape, Unknown, Wall, occupancy};
 use agents::names::suggest;
 use nalgebra::{Point2, Vector2};
 use std::ops::Range;
@@ -22,6 +23,9 @@ pub(crate) const CLASSES: [&str; 10] = [
     "toilet",
     "tv",
 ];
+
+const SHAPES: [(&str, Shape); 2] = [("rectangle", Shape::Rectangle), ("circle", Shape::Circle)];
+const UNKNOWN: [(&str, Unknown); 2] = [("blocked", Unknown::Blocked), ("free", Unknown::Free)];
 
 pub(super) fn rooms(scenario: &Table<'_>, names: &mut Names<'_>) -> Vec<Room> {
     if !scenario.has("room") {
@@ -137,13 +141,41 @@ fn door(
     })
 }
 
-pub(super) fn walls(scenario: &Table<'_>, rooms: &[Room], doors: &[Door]) -> Vec<Wall> {
+pub(super) fn walls(
+    scenario: &Table<'_>,
+    rooms: &[Room],
+    doors: &[Door],
+    read: Read<'_>,
+) -> Vec<Wall> {
     let mut extra = Vec::new();
     for table in scenario.tables("wall") {
         extra.push([point(&table, "from"), point(&table, "to")]);
         table.close();
     }
-    geometry::walls(rooms, doors, &extra)
+    let mut walls = geometry::walls(rooms, doors, &extra);
+    walls.extend(mapped(scenario, read));
+    walls
+}
+
+/// The walls of the occupancy map, where there is one.
+fn mapped(scenario: &Table<'_>, read: Read<'_>) -> Vec<Wall> {
+    let unknown = word(
+        scenario,
+        "map_unknown",
+        "meaning of unknown cells",
+        &UNKNOWN,
+    );
+    let Some(map) = scenario.get::<String>("map") else {
+        return Vec::new();
+    };
+    occupancy::walls(&map.value, unknown, read).unwrap_or_else(|error| {
+        let kind = ProblemKind::Map {
+            path: map.value,
+            error,
+        };
+        scenario.problems.add(kind, map.span);
+        Vec::new()
+    })
 }
 
 pub(super) fn bounds(scenario: &Table<'_>, rooms: &[Room]) -> [f64; 4] {
@@ -228,7 +260,7 @@ pub(super) fn objects(scenario: &Table<'_>, names: &mut Names<'_>, rooms: &[Room
         if let Some(class) = &class {
             check_class(table.problems, class);
         }
-        let shape = shape(&table);
+        let shape = word(&table, "shape", "shape", &SHAPES);
         let size = table.require::<[f64; 2]>("size");
         let [x, y] = size.as_ref().map_or([1.0; 2], |size| size.value);
         if let Some(size) = size.filter(|size| size.value.iter().any(|side| *side <= 0.0)) {
@@ -264,24 +296,30 @@ pub(super) fn objects(scenario: &Table<'_>, names: &mut Names<'_>, rooms: &[Room
     objects
 }
 
-fn shape(table: &Table<'_>) -> Shape {
-    let Some(shape) = table.get::<String>("shape") else {
-        return Shape::Rectangle;
+/// What one of a few words means; the first where none is given.
+fn word<T: Copy>(
+    table: &Table<'_>,
+    key: &'static str,
+    kind: &'static str,
+    words: &[(&str, T)],
+) -> T {
+    let given = table.get::<String>(key);
+    let Some(given) = given else {
+        return words[0].1;
     };
-    match shape.value.as_str() {
-        "rectangle" => Shape::Rectangle,
-        "circle" => Shape::Circle,
-        _ => {
-            let help = suggest(&shape.value, ["rectangle", "circle"]);
+    let meaning = words.iter().find(|(word, _)| *word == given.value);
+    meaning
+        .unwrap_or_else(|| {
+            let help = suggest(&given.value, words.iter().map(|(word, _)| *word));
             let kind = ProblemKind::UnknownName {
-                kind: "shape",
-                name: shape.value,
+                kind,
+                name: given.value,
                 help,
             };
-            table.problems.add(kind, shape.span);
-            Shape::Rectangle
-        }
-    }
+            table.problems.add(kind, given.span);
+            &words[0]
+        })
+        .1
 }
 
 /// Notes that a body of this radius at `at` is in no room, or in a wall or one of the objects.

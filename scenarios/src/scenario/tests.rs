@@ -67,8 +67,8 @@ goal = "missions/visit.aggt"
 
 fn parse(text: &str) -> Result<Scenario, Box<Invalid>> {
     Scenario::parse("scenario.toml", text, &|name| match name {
-        "rules.aggl" => Ok("the rules".to_owned()),
-        "missions/visit.aggt" => Ok("the goal".to_owned()),
+        "rules.aggl" => Ok(b"the rules".to_vec()),
+        "missions/visit.aggt" => Ok(b"the goal".to_vec()),
         _ => Err(std::io::Error::other("no such file")),
     })
 }
@@ -256,9 +256,9 @@ end = "10:00"
                · ─────
              6 │ 
                ╰────
-              help: known are: start, name, duration, room, door, wall, bounds, place, object,
-                    camera, robot, person, stream, activity, mission, rules, tracks, social,
-                    human_observer
+              help: known are: start, name, duration, room, door, wall, map_unknown, map, bounds,
+                    place, object, camera, robot, person, stream, activity, mission, rules, tracks,
+                    social, human_observer
 
             Error: 
               × room `hall` has 2 corners, a polygon needs at least 3
@@ -464,7 +464,7 @@ fn a_base_goes_by_its_name_and_is_differential_where_none_is_given() {
             "name = \"hall\"\nstart = \"2026-03-02T10:00:00\"\nduration = 9.0\n[[room]]\nname = \"hall\"\n\
              polygon = [[0, 0], [4, 0], [4, 4], [0, 4]]\n[robot]\npose = [2, 2, 0]\n{line}\n"
         );
-        Scenario::parse("scenario.toml", &text, &|_| Ok(String::new()))
+        Scenario::parse("scenario.toml", &text, &|_| Ok(Vec::new()))
     };
     assert_eq!(
         read("").unwrap().robot.base,

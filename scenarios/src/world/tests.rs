@@ -57,7 +57,7 @@ schedule = [{ at = "10:00:01", go = [3.0, 1.0], face = "ana" }]
 "#;
 
 pub(super) fn scenario() -> Scenario {
-    let read = |_: &str| Ok(String::new());
+    let read = |_: &str| Ok(Vec::new());
     Scenario::parse("scenario.toml", SCENARIO, &read).expect("a good scenario")
 }
 

@@ -124,7 +124,7 @@ fn of_file(
     };
     let folder = path.parent().unwrap_or(Path::new(""));
     let name = path.display().to_string();
-    let read = |name: &str| std::fs::read_to_string(folder.join(name));
+    let read = |name: &str| std::fs::read(folder.join(name));
     let (file, wrong) = MissionFile::parse(&name, &read_text(path)?, present, &read);
     // What could not be read has no text, and is told of already.
     let is_read = |text: &str| wrong.is_none() || !text.is_empty();

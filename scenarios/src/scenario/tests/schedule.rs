@@ -16,8 +16,8 @@ cancelled = true
 fn with(schedule: &str) -> Result<Scenario, Box<Invalid>> {
     let text = format!("schedule = \"today.toml\"\n{TWO_ROOMS}");
     let read = |name: &str| match name {
-        "today.toml" => Ok(schedule.to_owned()),
-        _ => Ok(String::new()),
+        "today.toml" => Ok(schedule.as_bytes().to_vec()),
+        _ => Ok(Vec::new()),
     };
     Scenario::parse("rooms/scenario.toml", &text, &read)
 }

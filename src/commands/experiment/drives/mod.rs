@@ -14,7 +14,7 @@ use scenarios::Scenario;
 
 /// The scenario of that text.
 pub(super) fn scene(name: &str, text: &str) -> Result<Scenario, Failure> {
-    let no_file = |_: &str| Ok(String::new());
+    let no_file = |_: &str| Ok(Vec::new());
     Scenario::parse(name, text, &no_file).map_err(Failure::internal)
 }
 
