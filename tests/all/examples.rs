@@ -44,7 +44,7 @@ fn grammars_and_goals_are_read_without_a_complaint() {
 #[test]
 fn scenarios_are_read_without_a_complaint() {
     for text in blocks("scenario-files", "toml") {
-        let files = |_: &str| Ok(String::new());
+        let files = |_: &str| Ok(Vec::new());
         let scenario = Scenario::parse("scenario.toml", &text, &files);
         assert!(scenario.is_ok(), "{:?}", scenario.err());
     }
@@ -78,7 +78,7 @@ fn known_keys() -> BTreeSet<String> {
             text.push('\n');
         }
     }
-    let files = |_: &str| Ok(String::new());
+    let files = |_: &str| Ok(Vec::new());
     let invalid = Scenario::parse("scenario.toml", &text, &files).unwrap_err();
     let mut keys = BTreeSet::new();
     for problem in invalid.problems {
