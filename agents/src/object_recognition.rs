@@ -64,6 +64,8 @@ pub struct RecognizedObject {
     pub places: Vec<Place>,
     /// When those probabilities hold.
     pub remembered: Time,
+    /// How long it stays at a place on average, s, where that was learned.
+    pub stay: Option<f64>,
 }
 
 /// A usable detection in the world frame.

@@ -57,7 +57,7 @@ impl Candidate {
             missed_until: object.last_seen,
             existence: object.confidence.clamp(0.01, 0.999),
             room: object.in_room.clone(),
-            memory: Memory::resumed(object.places.clone(), object.remembered),
+            memory: Memory::resumed(object.places.clone(), object.remembered, object.stay),
         }
     }
 
@@ -159,6 +159,7 @@ impl Candidate {
             in_room: self.room.clone(),
             places: self.memory.ranked(),
             remembered: self.memory.time().unwrap_or(self.last_seen),
+            stay: self.memory.learned_stay(),
         })
     }
 }

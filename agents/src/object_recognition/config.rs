@@ -65,8 +65,13 @@ pub struct Config {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MemoryConfig {
-    /// How long an object stays where it is before somebody takes it elsewhere, on average, s.
+    /// How long an object stays where it is before somebody takes it elsewhere, on average, s: until it is learned of
+    /// that object.
     pub stay: f64,
+    /// How fast that is learned; 0: never.
+    pub stay_rate: f64,
+    /// Found again where it was after nobody saw it for longer than this, an object was found once more, s.
+    pub visit_gap: f64,
     /// Probability that a look at the object's place detects it. Lower than a detector's own figure:
     /// what hides an object hides it for many looks in a row.
     pub detection_probability: f64,
@@ -84,7 +89,9 @@ pub struct MemoryConfig {
 impl Default for MemoryConfig {
     fn default() -> Self {
         Self {
-            stay: 4.0 * 3600.0,
+            stay: 3600.0,
+            stay_rate: 0.2,
+            visit_gap: 600.0,
             detection_probability: 0.5,
             false_probability: 0.05,
             new_place: 0.1,

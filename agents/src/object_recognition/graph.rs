@@ -2,8 +2,9 @@
 //! difference to the snapshot.
 //!
 //! Written: `pose` (moved by 1 cm or 1 degree), `size` (1 cm), `confidence` (0.05), `last_seen`
-//! (every 0.5 s), `in`, and `places` with `places_at` (another order, 0.02, 5 cm or 10 s); the type and `shape` only of nodes made here. Only nodes made here, of
-//! objects without identity, are ever deleted: others belong to whoever described the world.
+//! (every 0.5 s), `in`, `places` with `places_at` (another order, 0.02, 5 cm or 10 s), and `stay` (1 s); the type
+//! and `shape` only of nodes made here. Only nodes made here, of objects without identity, are ever deleted:
+//! others belong to whoever described the world.
 
 use super::{Config, Place, RecognizedObject, Recognizer};
 use crate::messages::CameraFrame;
@@ -22,6 +23,8 @@ const CONFIDENCE_STEP: f64 = 0.05;
 /// A place's probability, its position (m) and heading (rad), and when it was last seen there (s) are
 /// written when one of them changed by more than this.
 const PLACE_STEP: [f64; FIGURES] = [0.05, 0.05, 0.1, 0.02, 0.5, 10.0];
+/// How long it stays is written when it changed by more than this, s.
+const STAY_STEP: f64 = 1.0;
 /// What stands for a place: x, y, heading, probability, visits, `last_seen`.
 const FIGURES: usize = 6;
 
@@ -64,6 +67,7 @@ pub fn objects(snapshot: &Snapshot) -> Result<Vec<RecognizedObject>, ReadError> 
             last_seen: Time::from_seconds(last_seen),
             places: places(&node)?,
             remembered: Time::from_seconds(number(&node, "places_at")?.unwrap_or(last_seen)),
+            stay: number(&node, "stay")?,
         });
     }
     Ok(objects)
@@ -261,6 +265,9 @@ fn update(
         difference.transaction.set(node.id(), "places_at", at);
         let places = Value::F64List(new);
         difference.transaction.set(node.id(), "places", places);
+    }
+    if let Some(stay) = object.stay {
+        difference.number(node, "stay", stay, STAY_STEP)?;
     }
     Ok(())
 }

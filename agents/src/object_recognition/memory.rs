@@ -7,7 +7,11 @@
 //! - **Time.** Objects are taken somewhere else once in `stay` seconds, and then to a known place as often
 //!   as they have come to it, or to a new one: in t seconds each p becomes
 //!   k p + (1 - k) v / (n + 1) with k = exp(-t / stay), v its visits and n those of all places; and e
-//!   likewise with 1 in place of v.
+//!   likewise with 1 in place of v. A visit is counted where the object is found at another place than before, or
+//!   at the same after nobody saw it for a while: so v / n is how often it was found where.
+//! - **How long it stays** is learned. An object last seen t seconds ago is found at the same place with
+//!   probability k + (1 - k) v / (n + 1), at another with (1 - k) v / (n + 1); each visit moves the logarithm of `stay`
+//!   by `stay_rate` times the slope of the logarithm of that, which is taken as -1 to 1.
 //! - **A sighting** at a place multiplies its p by the probability of detecting what is there, and all
 //!   others and e by that of detecting what is not there; then all are divided by their sum. A
 //!   new place begins with a share of e.
@@ -28,7 +32,7 @@ pub struct Place {
     pub pose: Isometry2<f64>,
     /// Probability that it is there, in [0, 1].
     pub probability: f64,
-    /// How often it has come there.
+    /// How often it was found there.
     pub visits: u32,
     /// When it was last seen there.
     pub last_seen: Time,
@@ -44,14 +48,21 @@ pub(super) struct Memory {
     at: Option<usize>,
     /// Up to when looks in vain have been counted.
     looked: Option<Time>,
+    /// When it last was seen where it was for sure.
+    seen: Option<Time>,
+    /// How long it stays where it is, on average, as learned so far, s.
+    stay: Option<f64>,
 }
 
 /// No look is so thorough, and no time so long, that less than this is left.
 const LEAST: f64 = 1e-3;
+/// What is learned of how long an object stays lies between these, s.
+const SHORTEST_STAY: f64 = 60.0;
+const LONGEST_STAY: f64 = 30.0 * 24.0 * 3600.0;
 
 impl Memory {
-    /// What was remembered at `time`.
-    pub(super) fn resumed(mut places: Vec<Place>, time: Time) -> Self {
+    /// What was remembered at `time`, and how long the object stays, where that was learned.
+    pub(super) fn resumed(mut places: Vec<Place>, time: Time, stay: Option<f64>) -> Self {
         places.retain(|place| {
             crate::perception::is_finite_pose(&place.pose)
                 && (0.0..=1.0).contains(&place.probability)
@@ -65,10 +76,12 @@ impl Memory {
         let likeliest = (0..places.len())
             .max_by(|&a, &b| places[a].probability.total_cmp(&places[b].probability));
         Self {
-            places,
             time: Some(time),
             at: likeliest,
             looked: None,
+            seen: likeliest.map(|index| places[index].last_seen),
+            stay: stay.filter(|stay| (SHORTEST_STAY..=LONGEST_STAY).contains(stay)),
+            places,
         }
     }
 
@@ -92,8 +105,8 @@ impl Memory {
     pub(super) fn pass(&mut self, now: Time, config: &MemoryConfig) {
         let since = self.time.map_or(0.0, |time| now.since(time).max(0.0));
         self.time = Some(self.time.map_or(now, |time| time.max(now)));
-        let keep = (-since / config.stay).exp();
-        let visits: u32 = self.places.iter().map(|place| place.visits).sum();
+        let keep = (-since / self.stay(config)).exp();
+        let visits = self.visits();
         for place in &mut self.places {
             let usual = f64::from(place.visits) / f64::from(visits + 1);
             place.probability = keep * place.probability + (1.0 - keep) * usual;
@@ -119,11 +132,55 @@ impl Memory {
         }
         self.normalise(elsewhere);
         let place = &mut self.places[index];
+        let absent = time.since(place.last_seen);
         place.pose = pose;
         place.last_seen = time;
-        if place.probability > 0.5 && self.at != Some(index) {
-            place.visits = place.visits.saturating_add(1);
-            self.at = Some(index);
+        if place.probability <= 0.5 {
+            return;
+        }
+        let stayed = self.at == Some(index);
+        if stayed && absent <= config.visit_gap {
+            self.seen = Some(time);
+            return;
+        }
+        self.learn(index, time, config);
+        let place = &mut self.places[index];
+        place.visits = place.visits.saturating_add(1);
+        self.at = Some(index);
+        self.seen = Some(time);
+    }
+
+    /// How long it stays where it is on average, s, where that was learned.
+    pub(super) fn learned_stay(&self) -> Option<f64> {
+        self.stay
+    }
+
+    fn stay(&self, config: &MemoryConfig) -> f64 {
+        self.stay.unwrap_or(config.stay)
+    }
+
+    fn visits(&self) -> u32 {
+        self.places.iter().map(|place| place.visits).sum()
+    }
+
+    /// Learns from where it is found at `time` how long it stays: a step up the slope of the logarithm of how likely
+    /// it was to be found there, by the logarithm of `stay`.
+    fn learn(&mut self, found: usize, time: Time, config: &MemoryConfig) {
+        let (Some(at), Some(seen)) = (self.at, self.seen) else {
+            return;
+        };
+        let stay = self.stay(config);
+        let stays = time.since(seen).max(0.0) / stay;
+        let keep = (-stays).exp();
+        // A place that is new counts as one visit.
+        let visits = self.places[found].visits.max(1);
+        let usual = f64::from(visits) / f64::from(self.visits() + 1);
+        let same = f64::from(found == at);
+        let likelihood = keep * same + (1.0 - keep) * usual;
+        let slope = stays * keep * (same - usual) / likelihood;
+        if slope.is_finite() {
+            let learned = stay * (config.stay_rate * slope.clamp(-1.0, 1.0)).exp();
+            self.stay = Some(learned.clamp(SHORTEST_STAY, LONGEST_STAY));
         }
     }
 
@@ -196,7 +253,7 @@ impl Memory {
         let index = least.unwrap_or(0);
         self.places[index] = new;
         if self.at == Some(index) {
-            self.at = None;
+            (self.at, self.seen) = (None, None);
         }
         index
     }
@@ -318,6 +375,52 @@ mod tests {
             (places[0].probability - 3.0 / 7.0).abs() < 1e-6,
             "{places:?}"
         );
+    }
+
+    /// What was learned of an object that is found every `gap` seconds, here and there in turn or where it was.
+    fn learned(gap: f64, stays_put: bool, config: &Config) -> f64 {
+        let mut memory = Memory::default();
+        for visit in 0..200 {
+            let x = if stays_put || visit % 2 == 0 {
+                1.0
+            } else {
+                5.0
+            };
+            for look in 0..6 {
+                let time = at(f64::from(visit) * gap + f64::from(look));
+                memory.saw(time, pose(x), &config.memory);
+            }
+        }
+        memory.stay(&config.memory)
+    }
+
+    #[test]
+    fn how_long_it_stays_is_learned_of_what_moves_and_of_what_does_not() {
+        let config = Config::default();
+        let usual = config.memory.stay;
+        assert!(learned(usual / 2.0, false, &config) < usual / 3.0);
+        assert!(learned(usual / 2.0, true, &config) > usual);
+        let mut fixed = Config::default();
+        fixed.memory.stay_rate = 0.0;
+        let stay = learned(usual / 2.0, false, &fixed);
+        assert!((stay - usual).abs() < 1e-9, "{stay}");
+    }
+
+    #[test]
+    fn found_again_after_a_while_is_one_more_visit_and_what_was_learned_is_taken_over() {
+        let config = Config::default();
+        let (mut memory, clock) = seen(&[(1.0, 3)], &config);
+        memory.saw(at(clock + 60.0), pose(1.0), &config.memory);
+        assert_eq!(memory.ranked()[0].visits, 1);
+        let later = at(clock + 60.0 + 2.0 * config.memory.visit_gap);
+        memory.saw(later, pose(1.0), &config.memory);
+        assert_eq!(memory.ranked()[0].visits, 2);
+        let stay = memory.learned_stay();
+        assert!(stay.is_some());
+        let resumed = Memory::resumed(memory.ranked(), later, stay);
+        assert_eq!(resumed.learned_stay(), stay);
+        let absurd = Memory::resumed(memory.ranked(), later, Some(f64::NAN));
+        assert_eq!(absurd.learned_stay(), None);
     }
 
     #[test]

@@ -205,6 +205,7 @@ shape = { kind = "string" }
 size = { kind = "vector" }
 places = { kind = "f64_list" }
 places_at = { kind = "f64" }
+stay = { kind = "f64" }
 space = { kind = "f64_list" }
 "#;
 

@@ -216,9 +216,12 @@ fn places_survive_a_restart_and_answer_where_something_is() {
     };
     let told = |rows: [(&str, u32); 2]| rows.map(|(room, visits)| (room.to_owned(), visits));
     assert_eq!(answer(&home), told([("east", 1), ("west", 1)]));
+    let learned = home.agent.objects()[0].stay.unwrap();
+    assert!(learned < Config::default().memory.stay, "it was carried on");
     home.agent = ObjectRecognition::new(Config::default());
     home.go(PERIOD, &[]);
     assert_eq!(answer(&home), told([("east", 1), ("west", 1)]));
+    assert_eq!(home.agent.objects()[0].stay, Some(learned));
     // Looked for where it was seen last, but not where it was before, and not found.
     home.run.cameras.truncate(1);
     home.run.cameras[0].range = 5.0;

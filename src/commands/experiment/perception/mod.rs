@@ -38,7 +38,8 @@ second. Everybody who is there counts, at every moment, also who is hidden from 
 heading_error (mean) in rad, latency_p99 in s: from the frames of a moment to the people, 99 % of the moments.",
     "The second row is the agent's option `association = \"nearest\"`, after SORT. Figures are means over the seeds.",
     "right_place: of a hundred questions where one of six things is, in a home in which they are carried about unseen, how \
-many got the right answer, from the place that object recognition ranks first and from where it saw the thing last.",
+many got the right answer: from the place that object recognition ranks first, from where it saw the thing last, and from \
+somebody who knows by what law things are carried about and whose looks never err, which nobody can surpass.",
 ];
 
 /// What a recording or the square came to, as one tracker saw it.
@@ -91,20 +92,21 @@ pub(super) fn perception(seeds: u64, recording: Option<&Path>) -> Result<Table, 
             note: None,
         }
     });
-    let lives: Vec<home::Right> = (1..=seeds).map(home::live).collect();
-    let remembered = |label: &str, right: fn(&home::Right) -> f64| {
-        let values: Vec<f64> = lives.iter().map(right).collect();
-        let mut cells = vec![Cell::nothing(); COLUMNS.len() - 1];
-        cells.push(Cell::number(spread(&values).0));
-        Row {
-            label: label.to_owned(),
-            cells,
-            note: None,
-        }
-    };
     let mut rows = Vec::from(rows);
-    rows.push(remembered("ranked first", |right| right.ranked_first));
-    rows.push(remembered("seen last", |right| right.seen_last));
+    for home in [home::TIDY, home::BUSY] {
+        let lives: Vec<home::Right> = (1..=seeds).map(|seed| home::live(&home, seed)).collect();
+        let answers = ["ranked first", "seen last", "law known"];
+        rows.extend(answers.into_iter().enumerate().map(|(index, answer)| {
+            let values: Vec<f64> = lives.iter().map(|right| right.shares()[index]).collect();
+            let mut cells = vec![Cell::nothing(); COLUMNS.len() - 1];
+            cells.push(Cell::number(spread(&values).0));
+            Row {
+                label: format!("{}: {answer}", home.name),
+                cells,
+                note: None,
+            }
+        }));
+    }
     Ok(Table {
         columns: COLUMNS.into(),
         rows,
