@@ -32,7 +32,7 @@ pub enum ResumeError {
 /// The world, rooms, doors, places, cameras and activities become what the scenario says, and the
 /// robot is where the scenario begins, for the simulated robot is; missions that are over go, so
 /// that they are set again. All else stays: objects with their places, people, and missions under
-/// way.
+/// way. Frames of cameras that were under way when the earlier run ended are lost.
 ///
 /// # Errors
 /// [`ResumeError`].

@@ -174,6 +174,10 @@ pub struct Camera {
     pub miss_rate: f64,
     /// People found per second who are not there.
     pub false_rate: f64,
+    /// From the taking of an image to the arrival of what was found in it, at least, s.
+    pub delay: f64,
+    /// It takes up to this much longer, evenly distributed, s.
+    pub delay_jitter: f64,
 }
 
 /// The robot's body, drive and sensors.

@@ -17,7 +17,7 @@ mod timetable;
 mod walker;
 mod walking;
 
-use crate::scenario::Scenario;
+use crate::scenario::{Camera, Scenario};
 use crate::tracks::Tracks;
 use agents::messages::{CameraFrame, LaserScan, Odometry, Speech, VelocityCommand};
 use base::Base;
@@ -26,6 +26,7 @@ use dsr::Time;
 use localisation::Drift;
 use nalgebra::{Isometry2, Point2, Vector2};
 use obstacles::Obstacles;
+use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use random::stream;
 use route::FloorPlan;
@@ -46,7 +47,7 @@ pub struct Inputs {
 /// What the sensors deliver in one step, and what is true.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outputs {
-    /// Images that became due, in the order of the scenario's cameras.
+    /// Images that arrived, as they were due; of one moment, in the order of the scenario's cameras.
     pub frames: Vec<CameraFrame>,
     /// A turn of the laser, where one became due.
     pub scan: Option<LaserScan>,
@@ -162,6 +163,30 @@ impl Beat {
     }
 }
 
+/// A camera at work. What it sees and how long that takes are drawn apart: a delay changes no image.
+#[derive(Debug, Clone)]
+struct Eye {
+    beat: Beat,
+    sight: ChaCha8Rng,
+    delays: ChaCha8Rng,
+}
+
+impl Eye {
+    /// How long the next image takes to arrive, s.
+    fn delay(&mut self, camera: &Camera) -> f64 {
+        let jitter = camera.delay_jitter;
+        let more = (jitter > 0.0).then(|| self.delays.random::<f64>() * jitter);
+        camera.delay + more.unwrap_or_default()
+    }
+}
+
+/// An image that was taken and has not arrived.
+#[derive(Debug, Clone)]
+struct UnderWay {
+    due: Time,
+    frame: CameraFrame,
+}
+
 /// A running world.
 #[derive(Debug, Clone)]
 pub struct World {
@@ -175,7 +200,8 @@ pub struct World {
     localised: Time,
     laser: (Beat, ChaCha8Rng),
     localisation: (Beat, ChaCha8Rng),
-    cameras: Vec<(Beat, ChaCha8Rng)>,
+    cameras: Vec<Eye>,
+    under_way: Vec<UnderWay>,
 }
 
 impl World {
@@ -192,8 +218,12 @@ impl World {
         let mut wander = stream(seed, "localisation");
         let drift = Drift::new(&robot.localisation, &mut wander);
         let cameras = scenario.cameras.iter().map(|camera| {
-            let random = stream(seed, &format!("camera/{}", camera.name));
-            (Beat::new(camera.rate, start), random)
+            let name = &camera.name;
+            Eye {
+                beat: Beat::new(camera.rate, start),
+                sight: stream(seed, &format!("camera/{name}")),
+                delays: stream(seed, &format!("delay/{name}")),
+            }
         });
         Self {
             obstacles,
@@ -206,6 +236,7 @@ impl World {
             laser: (Beat::new(robot.laser.rate, start), stream(seed, "laser")),
             localisation: (Beat::new(robot.localisation.rate, start), wander),
             cameras: cameras.collect(),
+            under_way: Vec::new(),
             scenario: scenario.clone(),
         }
     }
@@ -261,21 +292,24 @@ impl World {
         }
     }
 
+    /// Takes the images that are due, and delivers those that have come so far.
     fn images(&mut self, dt: f64) -> Vec<CameraFrame> {
-        let mut frames = Vec::new();
-        for (camera, (beat, random)) in self.scenario.cameras.iter().zip(&mut self.cameras) {
-            if beat.is_due(self.now, dt) {
+        for (camera, eye) in self.scenario.cameras.iter().zip(&mut self.cameras) {
+            if eye.beat.is_due(self.now, dt) {
                 let people = self.crowd.bodies();
-                frames.push(camera::image(
-                    camera,
-                    &self.obstacles,
-                    people,
-                    random,
-                    self.now,
-                ));
+                let sight = &mut eye.sight;
+                let frame = camera::image(camera, &self.obstacles, people, sight, self.now);
+                let due = self.now + eye.delay(camera);
+                self.under_way.push(UnderWay { due, frame });
             }
         }
-        frames
+        self.under_way.sort_by_key(|image| image.due);
+        let arrived = |image: &UnderWay| image.due.since(self.now) <= dt / 2.0;
+        let count = self.under_way.partition_point(arrived);
+        self.under_way
+            .drain(..count)
+            .map(|image| image.frame)
+            .collect()
     }
 
     fn scan(&mut self, dt: f64) -> Option<LaserScan> {

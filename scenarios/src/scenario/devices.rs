@@ -18,6 +18,8 @@ pub(super) fn cameras(scenario: &Table<'_>, names: &mut Names<'_>) -> Vec<Camera
             heading_noise: table.number("heading_noise", Bound::NotNegative, 0.1),
             miss_rate: table.number("miss_rate", Bound::Probability, 0.05),
             false_rate: table.number("false_rate", Bound::NotNegative, 0.0),
+            delay: table.number("delay", Bound::NotNegative, 0.0),
+            delay_jitter: table.number("delay_jitter", Bound::NotNegative, 0.0),
         });
         table.close();
     }

@@ -435,6 +435,16 @@ fn each_kind_of_mistake_is_told_apart() {
         ("duration = 60.0", "duration = 0", |p| {
             matches!(p, P::OutOfRange { .. })
         }),
+        (
+            "[robot]",
+            "[[camera]]\nname = \"eye\"\npose = [1, 1, 0]\nfield_of_view = 1\nrange = 5\ndelay = -0.1\n[robot]",
+            |p| matches!(p, P::OutOfRange { .. }),
+        ),
+        (
+            "[robot]",
+            "[[camera]]\nname = \"eye\"\npose = [1, 1, 0]\nfield_of_view = 1\nrange = 5\ndelay_jitter = -1\n[robot]",
+            |p| matches!(p, P::OutOfRange { .. }),
+        ),
     ];
     for (from, to, is_expected) in hits {
         let found = problems(from, to);

@@ -152,6 +152,8 @@ mod tests {
             heading_noise: 0.0,
             miss_rate: 0.0,
             false_rate: 0.0,
+            delay: 0.0,
+            delay_jitter: 0.0,
         }
     }
 

@@ -1,5 +1,7 @@
 //! The simulated world: the same to the bit, and true to its scenario.
 
+mod sensing;
+
 use super::*;
 use crate::scenario::{Entry, Face, Stream};
 
