@@ -101,9 +101,10 @@ pub(super) fn scan(
             sweep.disc(centre, radius);
         }
     }
+    let nothing = laser.range as f32;
     let ranges = sweep.ranges.iter().map(|&range| {
         if range >= laser.range {
-            return laser.range as f32;
+            return nothing;
         }
         (range + normal(random, laser.noise)).clamp(0.0, laser.range) as f32
     });
@@ -111,7 +112,7 @@ pub(super) fn scan(
         time,
         angle_min: -PI,
         angle_step: sweep.step,
-        range_max: laser.range,
+        range_max: f64::from(nothing),
         ranges: ranges.collect(),
     }
 }
@@ -127,20 +128,32 @@ mod tests {
         f64::from(scan.ranges[index % scan.ranges.len()])
     }
 
-    fn scan_of(walls: Vec<Wall>, bodies: &[(Point2<f64>, f64)], pose: Isometry2<f64>) -> LaserScan {
-        let laser = Laser {
+    fn laser() -> Laser {
+        Laser {
             beams: 360,
             range: 10.0,
             noise: 0.0,
             rate: 10.0,
-        };
+        }
+    }
+
+    fn scan_of(walls: Vec<Wall>, bodies: &[(Point2<f64>, f64)], pose: Isometry2<f64>) -> LaserScan {
+        scan_with(&laser(), walls, bodies, pose)
+    }
+
+    fn scan_with(
+        laser: &Laser,
+        walls: Vec<Wall>,
+        bodies: &[(Point2<f64>, f64)],
+        pose: Isometry2<f64>,
+    ) -> LaserScan {
         let obstacles = Obstacles {
             walls,
             objects: Vec::new(),
         };
         let mut random = stream(1, "laser");
         scan(
-            &laser,
+            laser,
             &pose,
             &obstacles,
             bodies.iter().copied(),
@@ -162,6 +175,18 @@ mod tests {
         assert!((beam(&scan, 0.0) - 10.0).abs() < 1e-6, "nothing is ahead");
         let diagonal = beam(&scan, -PI / 4.0);
         assert!((diagonal - 2.0 * 2.0_f64.sqrt()).abs() < 1e-6, "{diagonal}");
+    }
+
+    #[test]
+    fn a_beam_that_meets_nothing_reads_the_greatest_range_to_the_bit() {
+        // 5.6 is less as an f32 than as an f64.
+        let laser = Laser {
+            range: 5.6,
+            ..laser()
+        };
+        let scan = scan_with(&laser, Vec::new(), &[], Isometry2::identity());
+        let met = |range: &&f32| f64::from(**range) < scan.range_max;
+        assert_eq!(scan.ranges.iter().filter(met).count(), 0);
     }
 
     proptest! {
