@@ -214,6 +214,8 @@ pub struct Laser {
     pub range: f64,
     /// Standard deviation of a range, m.
     pub noise: f64,
+    /// Probability that a beam reads as if it met nothing.
+    pub dropout_rate: f64,
     /// Turns per second.
     pub rate: f64,
 }
@@ -384,6 +386,7 @@ impl Default for Robot {
                 beams: 360,
                 range: 10.0,
                 noise: 0.01,
+                dropout_rate: 0.0,
                 rate: 10.0,
             },
             localisation: Localisation {

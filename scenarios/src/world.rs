@@ -199,6 +199,7 @@ pub struct World {
     drift: Drift,
     localised: Time,
     laser: (Beat, ChaCha8Rng),
+    dropouts: ChaCha8Rng,
     localisation: (Beat, ChaCha8Rng),
     cameras: Vec<Eye>,
     under_way: Vec<UnderWay>,
@@ -234,6 +235,7 @@ impl World {
             drift,
             localised: start,
             laser: (Beat::new(robot.laser.rate, start), stream(seed, "laser")),
+            dropouts: stream(seed, "dropouts"),
             localisation: (Beat::new(robot.localisation.rate, start), wander),
             cameras: cameras.collect(),
             under_way: Vec::new(),
@@ -321,14 +323,10 @@ impl World {
             .map(|body| (body.position, body.radius));
         let laser = &self.scenario.robot.laser;
         beat.is_due(self.now, dt).then(|| {
-            laser::scan(
-                laser,
-                &self.base.pose,
-                &self.obstacles,
-                people,
-                random,
-                self.now,
-            )
+            let pose = &self.base.pose;
+            let mut scan = laser::scan(laser, pose, &self.obstacles, people, random, self.now);
+            laser::drop_out(laser, &mut scan, &mut self.dropouts);
+            scan
         })
     }
 

@@ -57,6 +57,11 @@ pub(super) fn robot(scenario: &Table<'_>, names: &mut Names<'_>) -> Robot {
             beams: beams.clamp(1.0, 10_000.0) as usize,
             range: laser.number("range", Bound::Positive, default.laser.range),
             noise: laser.number("noise", Bound::NotNegative, default.laser.noise),
+            dropout_rate: laser.number(
+                "dropout_rate",
+                Bound::Probability,
+                default.laser.dropout_rate,
+            ),
             rate: laser.number("rate", Bound::Positive, default.laser.rate),
         };
         laser.close();

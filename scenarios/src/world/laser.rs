@@ -7,6 +7,7 @@ use crate::scenario::{Laser, Wall};
 use agents::messages::LaserScan;
 use dsr::Time;
 use nalgebra::{Isometry2, Point2, Vector2};
+use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::{PI, TAU};
 
@@ -117,6 +118,17 @@ pub(super) fn scan(
     }
 }
 
+/// Makes beams of `scan` read as if they had met nothing, each with the laser's probability.
+pub(super) fn drop_out(laser: &Laser, scan: &mut LaserScan, random: &mut ChaCha8Rng) {
+    if laser.dropout_rate > 0.0 {
+        for range in &mut scan.ranges {
+            if random.random_bool(laser.dropout_rate) {
+                *range = laser.range as f32;
+            }
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -133,6 +145,7 @@ mod tests {
             beams: 360,
             range: 10.0,
             noise: 0.0,
+            dropout_rate: 0.0,
             rate: 10.0,
         }
     }

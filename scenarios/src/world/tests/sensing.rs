@@ -1,7 +1,11 @@
 //! What sensors make of the world: when frames arrive, and what observers make of them.
 
 use super::*;
+use agents::grid::CostGrid;
 use agents::human_observer::{Config, Observer, Scene, Surroundings};
+use agents::navigation::map_age::MapState;
+use agents::navigation::navigator::{Inputs as Seen, Navigator, Status};
+use agents::navigation::target::{Target, Task};
 use agents::perception::FloorPlan;
 
 /// A hall with a camera that misses nobody, and somebody who walks along it from the first second on.
@@ -106,4 +110,70 @@ fn an_observer_tracks_a_walker_through_late_frames() {
         observer.refused(),
         agents::human_observer::Refused::default()
     );
+}
+
+#[test]
+fn lost_beams_read_the_greatest_range_at_the_stated_rate_and_the_others_as_ever() {
+    let mut scenario = hall();
+    let scans = |scenario: &Scenario| -> Vec<LaserScan> {
+        let outputs = run(&mut World::new(scenario, 3, None), 5.0, None);
+        outputs.into_iter().filter_map(|o| o.scan).collect()
+    };
+    let plain = scans(&scenario);
+    scenario.robot.laser.dropout_rate = 0.2;
+    let (mut met, mut lost) = (0.0, 0.0);
+    for (plain, scan) in plain.iter().zip(&scans(&scenario)) {
+        for (&before, &now) in plain.ranges.iter().zip(&scan.ranges) {
+            let is_lost = before < 10.0 && now.to_bits() == 10.0_f32.to_bits();
+            assert!(is_lost || before.to_bits() == now.to_bits());
+            met += f64::from(u8::from(before < 10.0));
+            lost += f64::from(u8::from(is_lost));
+        }
+    }
+    assert!((lost / met - 0.2_f64).abs() < 0.02, "{lost} of {met}");
+}
+
+#[test]
+fn somebody_whom_only_the_laser_sees_is_not_driven_into_where_beams_get_lost() {
+    for seed in 1..=5 {
+        let mut scenario = hall();
+        scenario.people[0].schedule.clear();
+        scenario.people[0].pose = Isometry2::new(Vector2::new(5.0, 3.0), 0.0);
+        scenario.robot.pose = Isometry2::new(Vector2::new(1.0, 3.0), 0.0);
+        scenario.robot.laser.dropout_rate = 0.2;
+        let mut world = World::new(&scenario, seed, None);
+        let mut navigator = Navigator::default();
+        let grid = CostGrid::covering([0.0, 0.0, 12.0, 6.0], 0.1);
+        let task = Task {
+            id: "across".to_owned(),
+            target: Target::Point(Point2::new(10.0, 3.0)),
+        };
+        let (mut scan, mut odometry, mut velocity) = (None, None, None);
+        let mut status = Status::Idle;
+        for _ in 0..600 {
+            let speech = Vec::new();
+            let output = world.step(0.1, &Inputs { velocity, speech });
+            scan = output.scan.or(scan);
+            odometry = output.odometry.or(odometry);
+            let seen = Seen {
+                odometry: odometry.as_ref(),
+                scan: scan.as_ref(),
+                grid: Some(&grid),
+                map: MapState::Current,
+                walls: &scenario.walls,
+                people: &[],
+                task: Some(&task),
+                limits: scenario.robot.limits(),
+                social: false,
+            };
+            let step = navigator.step(world.time(), &seen);
+            velocity = Some(step.command);
+            status = step.status;
+            if status == Status::Arrived {
+                break;
+            }
+        }
+        assert_eq!(status, Status::Arrived, "seed {seed}");
+        assert_eq!(world.truth().collisions.total(), 0, "seed {seed}");
+    }
 }
